@@ -1,0 +1,195 @@
+#include "common/dataset.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "common/height_tile.h"
+#include "common/texture_tile.h"
+
+namespace scree {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Error store_error(std::string message) { return {ErrorCode::store, std::move(message)}; }
+
+// Reads typed members of a JSON object and remembers the first that is missing or of the wrong type.
+class Fields {
+public:
+    explicit Fields(const Json& object) : object_(object) {}
+
+    void read(const char* key, double& out) {
+        const Json* v = find(key);
+        if (v == nullptr) return;
+        if (!v->is_number() || !std::isfinite(v->get<double>())) return fail(key, "is not a finite number");
+        out = v->get<double>();
+    }
+    void read(const char* key, std::int64_t& out) {
+        const Json* v = find(key);
+        if (v == nullptr) return;
+        if (!v->is_number_integer() || (v->is_number_unsigned() && v->get<std::uint64_t>() > INT64_MAX))
+            return fail(key, "is not an integer");
+        out = v->get<std::int64_t>();
+    }
+    void read(const char* key, int& out) {
+        std::int64_t value = out;
+        read(key, value);
+        if (value < -1000000 || value > 1000000) return fail(key, "is out of range");
+        out = static_cast<int>(value);
+    }
+    void read(const char* key, bool& out) {
+        const Json* v = find(key);
+        if (v == nullptr) return;
+        if (!v->is_boolean()) return fail(key, "is not true or false");
+        out = v->get<bool>();
+    }
+    void read(const char* key, std::string& out) {
+        const Json* v = find(key);
+        if (v == nullptr) return;
+        if (!v->is_string()) return fail(key, "is not text");
+        out = v->get<std::string>();
+    }
+    const Json* array(const char* key) {
+        const Json* v = find(key);
+        if (v != nullptr && !v->is_array()) {
+            fail(key, "is not a list");
+            return nullptr;
+        }
+        return v;
+    }
+    const std::string& problem() const { return problem_; }
+
+private:
+    const Json* find(const char* key) {
+        const auto it = object_.find(key);
+        if (it == object_.end()) {
+            fail(key, "is missing");
+            return nullptr;
+        }
+        return &*it;
+    }
+    void fail(const char* key, const char* what) {
+        if (problem_.empty()) problem_ = fmt::format("'{}' {}", key, what);
+    }
+
+    const Json& object_;
+    std::string problem_;
+};
+
+}  // namespace
+
+double Dataset::texel_m(int level) const {
+    return std::ldexp(lattice.spacing_m, lattice.deepest_level - level + lattice.tile_cells_log2 - texture_size_log2);
+}
+
+int Dataset::deepest_level() const { return std::max(lattice.deepest_level, texture_deepest_level); }
+
+Result<void> Dataset::check() const {
+    if (auto ok = lattice.check(); !ok) return store_error("dataset: " + ok.error().message);
+    const auto finite = [](double v) { return std::isfinite(v); };
+    if (!finite(height_offset_m) || !finite(height_quantum_m) || height_quantum_m <= 0 || height_quantum_m > 1e6 ||
+        height_quantum_m < 1e-9 || std::abs(height_offset_m) > 1e9)
+        return store_error(fmt::format("dataset: heights of offset {} m and quantum {} m are not usable",
+                                       height_offset_m, height_quantum_m));
+    if (!finite(min_height_m) || !finite(max_height_m) || min_height_m > max_height_m)
+        return store_error(fmt::format("dataset: height range {}..{} m is not a range", min_height_m, max_height_m));
+    if (texture_size_log2 < kMinTextureSizeLog2 || texture_size_log2 > kMaxTextureSizeLog2)
+        return store_error(fmt::format("dataset: texture size 2^{} is outside 16..2048", texture_size_log2));
+    if (texture_deepest_level < 0 || texture_deepest_level > kMaxLevel)
+        return store_error(fmt::format("dataset: texture level {} is outside 0..30", texture_deepest_level));
+    if (height_tiles < 1 || texture_tiles < 1 || present_cells < 1)
+        return store_error("dataset: a store holds at least one tile of each kind and one present cell");
+    return {};
+}
+
+std::string dataset_to_json(const Dataset& d) {
+    Json sources = Json::array();
+    for (const SourceRecord& s : d.sources)
+        sources.push_back({{"name", s.name}, {"role", s.role}, {"bytes", s.bytes}, {"width", s.width}, {"height", s.height}});
+    const Json json = {{"format_version", kFormatVersion},
+                       {"origin_x_m", d.lattice.origin_x_m},
+                       {"origin_y_m", d.lattice.origin_y_m},
+                       {"spacing_m", d.lattice.spacing_m},
+                       {"cells_x", d.lattice.cells_x},
+                       {"cells_y", d.lattice.cells_y},
+                       {"deepest_level", d.lattice.deepest_level},
+                       {"tile_cells_log2", d.lattice.tile_cells_log2},
+                       {"root_rows", d.lattice.root_rows},
+                       {"root_columns", d.lattice.root_columns},
+                       {"crs", d.crs},
+                       {"crs_name", d.crs_name},
+                       {"vertical_datum", d.vertical_datum},
+                       {"height_offset_m", d.height_offset_m},
+                       {"height_quantum_m", d.height_quantum_m},
+                       {"height_quantum_error_m", d.height_quantum_error_m},
+                       {"warp_error_m", d.warp_error_m},
+                       {"min_height_m", d.min_height_m},
+                       {"max_height_m", d.max_height_m},
+                       {"texture_size_log2", d.texture_size_log2},
+                       {"texture_deepest_level", d.texture_deepest_level},
+                       {"has_imagery", d.has_imagery},
+                       {"height_tiles", d.height_tiles},
+                       {"texture_tiles", d.texture_tiles},
+                       {"present_cells", d.present_cells},
+                       {"sources", sources},
+                       {"attribution", d.attribution}};
+    return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+Result<Dataset> dataset_from_json(const std::string& text) {
+    const Json json = Json::parse(text, nullptr, false);
+    if (json.is_discarded() || !json.is_object()) return store_error("dataset: the description is not a JSON object");
+    Dataset d;
+    int version = 0;
+    Fields fields(json);
+    fields.read("format_version", version);
+    if (fields.problem().empty() && version != kFormatVersion)
+        return store_error(fmt::format("dataset: format version {}; this program reads version {}", version, kFormatVersion));
+    fields.read("origin_x_m", d.lattice.origin_x_m);
+    fields.read("origin_y_m", d.lattice.origin_y_m);
+    fields.read("spacing_m", d.lattice.spacing_m);
+    fields.read("cells_x", d.lattice.cells_x);
+    fields.read("cells_y", d.lattice.cells_y);
+    fields.read("deepest_level", d.lattice.deepest_level);
+    fields.read("tile_cells_log2", d.lattice.tile_cells_log2);
+    fields.read("root_rows", d.lattice.root_rows);
+    fields.read("root_columns", d.lattice.root_columns);
+    fields.read("crs", d.crs);
+    fields.read("crs_name", d.crs_name);
+    fields.read("vertical_datum", d.vertical_datum);
+    fields.read("height_offset_m", d.height_offset_m);
+    fields.read("height_quantum_m", d.height_quantum_m);
+    fields.read("height_quantum_error_m", d.height_quantum_error_m);
+    fields.read("warp_error_m", d.warp_error_m);
+    fields.read("min_height_m", d.min_height_m);
+    fields.read("max_height_m", d.max_height_m);
+    fields.read("texture_size_log2", d.texture_size_log2);
+    fields.read("texture_deepest_level", d.texture_deepest_level);
+    fields.read("has_imagery", d.has_imagery);
+    fields.read("height_tiles", d.height_tiles);
+    fields.read("texture_tiles", d.texture_tiles);
+    fields.read("present_cells", d.present_cells);
+    fields.read("attribution", d.attribution);
+    if (const Json* sources = fields.array("sources"); sources != nullptr) {
+        for (const Json& item : *sources) {
+            if (!item.is_object()) return store_error("dataset: a source is not a JSON object");
+            SourceRecord record;
+            Fields source(item);
+            source.read("name", record.name);
+            source.read("role", record.role);
+            source.read("bytes", record.bytes);
+            source.read("width", record.width);
+            source.read("height", record.height);
+            if (!source.problem().empty()) return store_error("dataset: source " + source.problem());
+            d.sources.push_back(std::move(record));
+        }
+    }
+    if (!fields.problem().empty()) return store_error("dataset: " + fields.problem());
+    if (auto ok = d.check(); !ok) return ok.error();
+    return d;
+}
+
+}  // namespace scree

@@ -1,0 +1,62 @@
+// Dataset: what a store says of itself. Stored as one JSON row (docs/store-format.md); everything read from it is checked.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/lattice.h"
+#include "common/result.h"
+
+namespace scree {
+
+inline constexpr int kFormatVersion = 1;
+
+struct SourceRecord {
+    std::string name;  ///< file name without folders
+    std::string role;  ///< "heights" or "imagery"
+    std::int64_t bytes = 0;
+    std::int64_t width = 0;
+    std::int64_t height = 0;
+};
+
+struct Dataset {
+    Lattice lattice;
+    std::string crs;             ///< "EPSG:n" or empty
+    std::string crs_name;        ///< for people
+    std::string vertical_datum;  ///< "EPSG:n" or empty
+
+    double height_offset_m = 0;         ///< z = offset + n * quantum
+    double height_quantum_m = 1;
+    double height_quantum_error_m = 0;  ///< 0 when every source height is a multiple of the quantum
+    double warp_error_m = 0;            ///< stated apart: a store cannot see it
+    double min_height_m = 0;            ///< over valid source samples
+    double max_height_m = 0;
+
+    int texture_size_log2 = 8;
+    int texture_deepest_level = 0;
+    bool has_imagery = false;  ///< false: a tint made from the heights
+
+    std::int64_t height_tiles = 0;
+    std::int64_t texture_tiles = 0;
+    std::int64_t present_cells = 0;  ///< finest cells whose four samples were valid
+
+    std::vector<SourceRecord> sources;
+    std::string attribution;
+
+    int texture_size() const { return 1 << texture_size_log2; }
+    /// Metres along the side of a texel of texture level `level`.
+    double texel_m(int level) const;
+    /// Largest of height and texture depth.
+    int deepest_level() const;
+    double height_m(double n) const { return height_offset_m + n * height_quantum_m; }
+
+    Result<void> check() const;
+};
+
+/// Deterministic JSON text (keys in fixed order, shortest round-trip numbers).
+std::string dataset_to_json(const Dataset& dataset);
+/// Errors: ErrorCode::store; the message names the field.
+Result<Dataset> dataset_from_json(const std::string& text);
+
+}  // namespace scree

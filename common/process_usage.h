@@ -1,0 +1,15 @@
+// What the operating system has charged to this process so far.
+#pragma once
+
+#include <cstdint>
+
+namespace scree {
+
+struct ProcessUsage {
+    double cpu_seconds = 0;            ///< user + system
+    std::int64_t peak_rss_bytes = 0;
+};
+
+ProcessUsage process_usage();
+
+}  // namespace scree

@@ -1,0 +1,29 @@
+// What every command does alike: JSON reports, exit codes, interruption, sizes on the command line.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "common/result.h"
+
+namespace scree {
+
+/// Prints the error on stderr and returns its exit code.
+int report_error(const char* program, const Error& error);
+
+/// Writes `text` to FILE whole or not at all (temporary name, rename); "-" is standard output.
+Result<void> write_text(const std::string& file, const std::string& text);
+
+/// "256M", "1.5G", "65536": bytes with an optional binary suffix K, M, G. Nullopt for anything else.
+std::optional<std::int64_t> parse_bytes(const std::string& text);
+
+/// "800x600" to two positive integers.
+std::optional<std::pair<int, int>> parse_size(const std::string& text);
+
+/// Set by SIGINT and SIGTERM once install_interrupt_handler() was called; a second signal ends the process at once.
+const std::atomic<bool>& interrupt_flag();
+void install_interrupt_handler();
+
+}  // namespace scree

@@ -1,0 +1,196 @@
+#include "common/store/height_codec.h"
+
+#include <fmt/format.h>
+#include <zstd.h>
+
+#include <bit>
+#include <cassert>
+#include <cmath>
+#include <memory>
+
+#include "common/store/byte_io.h"
+
+namespace scree {
+namespace {
+
+constexpr std::uint8_t kHasPresence = 1;
+
+Error bad(std::string what) { return {ErrorCode::store, "height tile: " + std::move(what)}; }
+
+std::uint32_t zigzag(std::int32_t v) {
+    return (static_cast<std::uint32_t>(v) << 1) ^ static_cast<std::uint32_t>(v >> 31);
+}
+std::int32_t unzigzag(std::uint32_t v) {
+    return static_cast<std::int32_t>((v >> 1) ^ (~(v & 1) + 1));
+}
+
+void write_bounds(ByteWriter& out, const HeightBounds& bounds, int levels) {
+    out.i32(bounds.min_n);
+    out.i32(bounds.max_n);
+    for (int g = 0; g < levels; ++g) out.f32(bounds.error_n[static_cast<std::size_t>(g)]);
+}
+
+bool read_bounds(ByteReader& in, HeightBounds& bounds, int levels) {
+    bounds.min_n = in.i32();
+    bounds.max_n = in.i32();
+    bool good = bounds.min_n <= bounds.max_n && bounds.min_n >= -kMaxHeightUnits && bounds.max_n <= kMaxHeightUnits;
+    float previous = 0;
+    for (int g = 0; g < levels; ++g) {
+        const float error = in.f32();
+        good = good && std::isfinite(error) && error >= previous && error <= 4.0f * kMaxHeightUnits;
+        bounds.error_n[static_cast<std::size_t>(g)] = error;
+        previous = error;
+    }
+    return good;
+}
+
+// Residual of the plane predictor west + north - northwest; the first row and column predict from what there is.
+template <class At>
+std::int32_t predict(const At& at, int i, int j) {
+    if (i == 0) return j == 0 ? 0 : at(0, j - 1);
+    if (j == 0) return at(i - 1, 0);
+    return at(i - 1, j) + at(i, j - 1) - at(i - 1, j - 1);
+}
+
+struct ZstdContexts {
+    std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)> compress{ZSTD_createCCtx(), ZSTD_freeCCtx};
+    std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> decompress{ZSTD_createDCtx(), ZSTD_freeDCtx};
+};
+ZstdContexts& zstd_contexts() {
+    thread_local ZstdContexts contexts;
+    return contexts;
+}
+
+void append_presence(std::vector<std::uint8_t>& out, const std::vector<std::uint8_t>& presence) {
+    std::uint8_t byte = 0;
+    for (std::size_t k = 0; k < presence.size(); ++k) {
+        if (presence[k] != 0) byte = static_cast<std::uint8_t>(byte | (1u << (k % 8)));
+        if (k % 8 == 7 || k + 1 == presence.size()) {
+            out.push_back(byte);
+            byte = 0;
+        }
+    }
+}
+
+Result<void> read_presence(ByteReader& in, std::size_t cells, std::vector<std::uint8_t>& presence) {
+    const auto bits = in.bytes((cells + 7) / 8);
+    if (!in.ok()) return bad("presence bits are cut short");
+    presence.resize(cells);
+    for (std::size_t k = 0; k < cells; ++k) presence[k] = (bits[k / 8] >> (k % 8)) & 1;
+    return {};
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> encode_height_tile(const HeightTile& tile, int n, HeightCodec codec) {
+    const int pitch = (1 << n) + 1;
+    const auto count = static_cast<std::size_t>(pitch * pitch);
+    assert(tile.samples.size() == count);
+    assert(tile.presence.empty() || tile.presence.size() == static_cast<std::size_t>(1 << (2 * n)));
+    const auto at = [&](int i, int j) { return tile.samples[static_cast<std::size_t>(j * pitch + i)]; };
+
+    std::vector<std::uint8_t> payload;
+    ByteWriter out(payload);
+    out.u8(tile.header.child_mask);
+    out.u8(tile.presence.empty() ? 0 : kHasPresence);
+    write_bounds(out, tile.header.own, geomip_level_count(n));
+    for (int q = 0; q < 4; ++q)
+        if ((tile.header.child_mask >> q & 1) != 0)
+            write_bounds(out, tile.header.children[static_cast<std::size_t>(q)], geomip_level_count(n));
+
+    if (codec == HeightCodec::raw) {
+        for (const std::int32_t v : tile.samples) out.i32(v);
+        append_presence(payload, tile.presence);
+        return payload;
+    }
+
+    std::vector<std::uint32_t> residuals(count);
+    std::uint32_t all = 0;
+    for (int j = 0; j < pitch; ++j)
+        for (int i = 0; i < pitch; ++i) {
+            const std::uint32_t r = zigzag(at(i, j) - predict(at, i, j));
+            residuals[static_cast<std::size_t>(j * pitch + i)] = r;
+            all |= r;
+        }
+    const int planes = std::max(1, (static_cast<int>(std::bit_width(all)) + 7) / 8);
+    std::vector<std::uint8_t> plain;
+    plain.reserve(count * static_cast<std::size_t>(planes) + tile.presence.size() / 8 + 1);
+    for (int plane = 0; plane < planes; ++plane)
+        for (const std::uint32_t r : residuals) plain.push_back(static_cast<std::uint8_t>(r >> (8 * plane)));
+    append_presence(plain, tile.presence);
+
+    std::vector<std::uint8_t> packed(ZSTD_compressBound(plain.size()));
+    const std::size_t size = ZSTD_compressCCtx(zstd_contexts().compress.get(), packed.data(), packed.size(), plain.data(),
+                                               plain.size(), 1);
+    assert(ZSTD_isError(size) == 0);
+    out.u8(static_cast<std::uint8_t>(planes));
+    out.bytes({packed.data(), size});
+    return payload;
+}
+
+Result<HeightTile> decode_height_tile(std::span<const std::uint8_t> payload, int n, int codec) {
+    if (codec != static_cast<int>(HeightCodec::raw) && codec != static_cast<int>(HeightCodec::plane))
+        return bad(fmt::format("unknown codec {}", codec));
+    const int pitch = (1 << n) + 1;
+    const auto count = static_cast<std::size_t>(pitch * pitch);
+    const std::size_t cells = std::size_t{1} << (2 * n);
+
+    HeightTile tile;
+    ByteReader in(payload);
+    tile.header.child_mask = in.u8();
+    const std::uint8_t flags = in.u8();
+    if (!in.ok() || tile.header.child_mask > 15 || flags > kHasPresence)
+        return bad(fmt::format("child bits {} or flags {} out of range", tile.header.child_mask, flags));
+    if (!read_bounds(in, tile.header.own, geomip_level_count(n))) return bad("bounds out of range");
+    for (int q = 0; q < 4; ++q)
+        if ((tile.header.child_mask >> q & 1) != 0 &&
+            !read_bounds(in, tile.header.children[static_cast<std::size_t>(q)], geomip_level_count(n)))
+            return bad(fmt::format("bounds of child {} out of range", q));
+    if (!in.ok()) return bad("header is cut short");
+
+    if (codec == static_cast<int>(HeightCodec::raw)) {
+        const auto bytes = in.bytes(count * 4);
+        if (!in.ok()) return bad("samples are cut short");
+        tile.samples.resize(count);
+        ByteReader values(bytes);
+        for (auto& v : tile.samples) v = values.i32();
+        if ((flags & kHasPresence) != 0)
+            if (auto ok = read_presence(in, cells, tile.presence); !ok) return ok.error();
+        if (in.remaining() != 0) return bad(fmt::format("{} bytes too many", in.remaining()));
+    } else {
+        const int planes = in.u8();
+        if (!in.ok() || planes < 1 || planes > 4) return bad(fmt::format("{} byte planes", planes));
+        const std::size_t presence_bytes = (flags & kHasPresence) != 0 ? (cells + 7) / 8 : 0;
+        const std::size_t expected = count * static_cast<std::size_t>(planes) + presence_bytes;
+        const auto packed = in.bytes(in.remaining());
+        if (ZSTD_getFrameContentSize(packed.data(), packed.size()) != expected ||
+            ZSTD_findFrameCompressedSize(packed.data(), packed.size()) != packed.size())
+            return bad("compressed part does not hold one tile");
+        thread_local std::vector<std::uint8_t> plain;
+        plain.resize(expected);
+        const std::size_t size = ZSTD_decompressDCtx(zstd_contexts().decompress.get(), plain.data(), plain.size(),
+                                                     packed.data(), packed.size());
+        if (ZSTD_isError(size) != 0 || size != expected) return bad("compressed part is damaged");
+        tile.samples.resize(count);
+        const auto at = [&](int i, int j) { return tile.samples[static_cast<std::size_t>(j * pitch + i)]; };
+        for (int j = 0; j < pitch; ++j)
+            for (int i = 0; i < pitch; ++i) {
+                const auto k = static_cast<std::size_t>(j * pitch + i);
+                std::uint32_t r = 0;
+                for (int plane = 0; plane < planes; ++plane)
+                    r |= std::uint32_t{plain[static_cast<std::size_t>(plane) * count + k]} << (8 * plane);
+                const std::int64_t value = std::int64_t{unzigzag(r)} + predict(at, i, j);
+                if (value < -kMaxHeightUnits || value > kMaxHeightUnits) return bad("a height is out of range");
+                tile.samples[k] = static_cast<std::int32_t>(value);
+            }
+        if (presence_bytes != 0) {
+            ByteReader bits({plain.data() + count * static_cast<std::size_t>(planes), presence_bytes});
+            if (auto ok = read_presence(bits, cells, tile.presence); !ok) return ok.error();
+        }
+    }
+    for (const std::int32_t v : tile.samples)
+        if (v < -kMaxHeightUnits || v > kMaxHeightUnits) return bad(fmt::format("height {} is out of range", v));
+    return tile;
+}
+
+}  // namespace scree

@@ -1,0 +1,25 @@
+// Height tiles to bytes and back (docs/store-format.md, "Height payload"). Lossless. Thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/height_tile.h"
+#include "common/result.h"
+
+namespace scree {
+
+enum class HeightCodec : int {
+    raw = 0,   ///< 32-bit samples
+    plane = 1  ///< plane predictor, zigzag, byte planes, Zstandard
+};
+
+/// `tile.samples` must hold (2^n + 1)^2 values within kMaxHeightUnits (asserted: the builder made them).
+std::vector<std::uint8_t> encode_height_tile(const HeightTile& tile, int tile_cells_log2, HeightCodec codec);
+
+/// Errors: ErrorCode::store for any payload that is not exactly one well-formed tile: truncated, too long, counts or
+/// heights out of range, non-finite errors, unknown codec. Nothing is allocated from an unchecked length.
+Result<HeightTile> decode_height_tile(std::span<const std::uint8_t> payload, int tile_cells_log2, int codec);
+
+}  // namespace scree

@@ -1,0 +1,73 @@
+// A store in one SQLite file (docs/store-format.md): tables dataset, height and texture of the same shape, a checksum a row,
+// a checksum a page.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "common/store/tile_store.h"
+
+namespace scree {
+
+/// Opens read-only. Errors: ErrorCode::input missing or unreadable, ErrorCode::store not a store, damaged, or of another
+/// format version (both are named).
+class SqliteStore final : public TileStore {
+public:
+    static Result<std::unique_ptr<SqliteStore>> open(const std::string& path);
+    ~SqliteStore() override;
+
+    const Dataset& dataset() const override { return dataset_; }
+    Result<std::unique_ptr<TileReader>> open_reader() const override;
+    const std::string& path() const { return path_; }
+
+    struct RowView {
+        std::int64_t key = 0;
+        int codec = 0;
+        bool checksum_ok = false;
+        std::span<const std::uint8_t> payload;  ///< valid during the call
+    };
+    /// Every row of a table in key order. The visitor returns false to stop.
+    Result<void> for_each(TileKind kind, const std::function<bool(const RowView&)>& visit) const;
+
+    struct Contents {
+        std::int64_t height_rows = 0, texture_rows = 0;
+        std::int64_t height_bytes = 0, texture_bytes = 0;  ///< payloads
+        std::int64_t file_bytes = 0;
+    };
+    Result<Contents> contents() const;
+    /// SQLite's own structural check; empty text when sound.
+    Result<std::string> integrity_problems() const;
+    /// SHA-256 over (table, key, codec, payload) of every row in key order, hexadecimal.
+    Result<std::string> digest() const;
+
+private:
+    SqliteStore(std::string path, Dataset dataset) : path_(std::move(path)), dataset_(std::move(dataset)) {}
+    std::string path_;
+    Dataset dataset_;
+};
+
+/// Writes a new store. Single thread. The file under `path` is complete only after finish() returned ok: the caller builds
+/// under a temporary name and renames.
+class SqliteStoreWriter {
+public:
+    static Result<std::unique_ptr<SqliteStoreWriter>> create(const std::string& path);
+    ~SqliteStoreWriter();
+    SqliteStoreWriter(const SqliteStoreWriter&) = delete;
+    SqliteStoreWriter& operator=(const SqliteStoreWriter&) = delete;
+
+    Result<void> put(TileKind kind, std::int64_t key, int codec, std::span<const std::uint8_t> payload);
+    /// Writes the dataset row, commits, syncs the file and closes it.
+    Result<void> finish(const Dataset& dataset);
+
+private:
+    struct Impl;
+    explicit SqliteStoreWriter(std::unique_ptr<Impl> impl);
+    std::unique_ptr<Impl> impl_;
+};
+
+/// The checksum of a row: XXH3-64 over table number, key, codec and payload.
+std::uint64_t row_checksum(int table, std::int64_t key, int codec, std::span<const std::uint8_t> payload);
+
+}  // namespace scree

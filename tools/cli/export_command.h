@@ -1,0 +1,6 @@
+// scree export
+#pragma once
+
+namespace scree {
+int run_export(int argc, char** argv);
+}

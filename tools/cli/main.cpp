@@ -1,0 +1,63 @@
+// scree: the offline program. One subcommand a file.
+#include <fmt/format.h>
+
+#include <array>
+#include <exception>
+#include <new>
+#include <string>
+#include <string_view>
+
+#include "tools/cli/build_command.h"
+#include "tools/cli/export_command.h"
+#include "tools/cli/info_command.h"
+#include "tools/cli/synth_command.h"
+#include "tools/verify/verify_command.h"
+
+namespace {
+
+struct Command {
+    std::string_view name, summary;
+    int (*run)(int, char**);
+};
+
+constexpr std::array<Command, 5> kCommands{{
+    {"synth", "make a mountain landscape to try things on", scree::run_synth},
+    {"build", "cut a DEM and an image into a pyramid", scree::run_build},
+    {"info", "say what a store holds", scree::run_info},
+    {"verify", "check a store: bounds, edges, checksums, completeness", scree::run_verify},
+    {"export", "write part of a store in a common format", scree::run_export},
+}};
+
+void print_help() {
+    fmt::print("scree {}: terrain pyramids for scree-view\n\nUsage: scree COMMAND [OPTIONS]\n\n", SCREE_VERSION);
+    for (const Command& c : kCommands) fmt::print("  {:<8} {}\n", c.name, c.summary);
+    fmt::print("\nscree COMMAND --help tells more. Exit codes: 0 done, 1 a check failed, 2 usage, 3 input, 4 store, 5 I/O, "
+               "130 interrupted.\n");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    const std::string_view name = argc > 1 ? argv[1] : "";
+    if (name == "--help" || name == "-h") return print_help(), 0;
+    if (name == "--version") return fmt::print("scree {}\n", SCREE_VERSION), 0;
+    for (const Command& c : kCommands) {
+        if (c.name != name) continue;
+        std::string title = "scree " + std::string(name);
+        argv[1] = title.data();
+        try {
+            return c.run(argc - 1, argv + 1);
+        } catch (const std::bad_alloc&) {
+            fmt::print(stderr, "{}: out of memory\n", title);
+            return 5;
+        } catch (const std::exception& error) {
+            fmt::print(stderr, "{}: {}\n", title, error.what());
+            return 5;
+        }
+    }
+    if (name.empty())
+        fmt::print(stderr, "scree: a command is missing; scree --help lists them\n");
+    else
+        fmt::print(stderr, "scree: no command '{}'; scree --help lists them\n", name);
+    return 2;
+}

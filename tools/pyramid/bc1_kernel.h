@@ -1,0 +1,33 @@
+// The inside of the BC1 encoder: one vector kernel, compiled once for each instruction set, and the scalar path for the
+// blocks that the kernel leaves aside. All kernels give identical bytes.
+//
+// The kernel sources include nothing but this file, the intrinsics and their own body. A std inline function in them
+// would be emitted with AVX instructions under a name that the linker may pick for the whole program.
+#pragma once
+
+#include <stddef.h>
+#include <stdint.h>
+
+namespace scree {
+
+/// Encodes `block_count` neighbouring blocks, a multiple of kBc1GroupBlocks. Arguments as for encode_bc1_row.
+using Bc1Kernel = void(const uint8_t* rgba, size_t row_bytes, size_t block_count, uint8_t* out);
+
+/// Blocks side by side in the widest kernel; narrower ones divide it.
+inline constexpr size_t kBc1GroupBlocks = 16;
+
+/// The caller checks that the processor has the instruction set.
+Bc1Kernel bc1_kernel_sse2;
+Bc1Kernel bc1_kernel_avx2;
+Bc1Kernel bc1_kernel_avx512;  // AVX-512 F and BW
+
+/// The fastest kernel that this processor runs.
+Bc1Kernel* best_bc1_kernel();
+
+/// encode_bc1_row with the kernel given: whole groups directly, the rest through a padded copy.
+void encode_bc1_row_with(Bc1Kernel* kernel, const uint8_t* rgba, size_t row_bytes, size_t block_count, uint8_t* out);
+
+/// A block that has transparent texels, or that one colour represents best (its rounded mean). 8 bytes to `out`.
+void encode_bc1_special_block(const uint8_t* rgba, size_t row_bytes, uint8_t* out);
+
+}  // namespace scree

@@ -1,0 +1,31 @@
+// The build: spool the heights, build the height pyramid, then the texture pyramid, into one file that gets its final name
+// only when it is complete (docs/architecture.md, "The builder").
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <string>
+
+#include "common/result.h"
+#include "tools/pyramid/build_plan.h"
+
+namespace scree {
+
+struct BuildReport {
+    double seconds = 0;
+    double cpu_seconds = 0;
+    std::int64_t peak_rss_bytes = 0;
+    double source_megapixels = 0;
+    std::int64_t height_tiles = 0;
+    std::int64_t texture_tiles = 0;
+    std::int64_t store_bytes = 0;
+    std::string warning;  ///< what the user should know, or empty
+};
+
+/// Checks the disk and that OUT may be written; prints what will be needed unless quiet.
+Result<void> announce_build(const BuildPlan& plan, const BuildOptions& options);
+
+/// Polls `stop` (Ctrl-C): ErrorCode::interrupted, nothing left behind.
+Result<BuildReport> build_store(BuildPlan plan, const BuildOptions& options, const std::atomic<bool>& stop);
+
+}  // namespace scree

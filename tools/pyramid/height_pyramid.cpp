@@ -1,0 +1,328 @@
+#include "tools/pyramid/height_pyramid.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <limits>
+
+#include "common/mesh/geometric_error.h"
+#include "common/store/height_codec.h"
+
+namespace scree {
+namespace {
+
+// Samples at multiples of m: every vertex that a coarsest block of any ancestor can have. Filled ahead of the pass.
+class CornerGrid {
+public:
+    CornerGrid(const Lattice& lattice)
+        : m_(lattice.tile_cells()),
+          columns_((lattice.cells_x + m_ - 1) / m_ + 1),
+          rows_((lattice.cells_y + m_ - 1) / m_ + 1),
+          values_(static_cast<std::size_t>(columns_ * rows_)) {}
+
+    std::int64_t rows() const { return rows_; }
+    std::int64_t columns() const { return columns_; }
+    std::int32_t& at(std::int64_t c, std::int64_t r) { return values_[static_cast<std::size_t>(r * columns_ + c)]; }
+    /// Lattice vertex (i, j), multiples of m; beyond the data's extent the border is repeated.
+    std::int32_t vertex(std::int64_t i, std::int64_t j) const {
+        const std::int64_t c = std::min(i / m_, columns_ - 1), r = std::min(j / m_, rows_ - 1);
+        return values_[static_cast<std::size_t>(r * columns_ + c)];
+    }
+
+private:
+    std::int64_t m_, columns_, rows_;
+    std::vector<std::int32_t> values_;
+};
+
+// What a band of one level has gathered about one tile.
+struct TileRecord {
+    bool exists = false;
+    HeightBounds bounds;
+    std::array<double, kMaxLevel + 1> ancestor_error{};  // deepest tiles: error of each ancestor's coarsest block here
+    std::int64_t present_cells = 0;
+    std::vector<std::uint8_t> payload;
+};
+
+struct ParentRecord {
+    std::uint8_t child_mask = 0;
+    std::array<HeightBounds, 4> children;
+    double coarsest_error = 0;
+};
+
+struct LevelBand {
+    std::int64_t step = 1;     // finest cells from sample to sample
+    std::int64_t columns = 0;  // tiles
+    std::int64_t width = 0;    // samples in a row, columns * m + 1
+    std::int64_t band = 0;     // tile row being gathered
+    std::int64_t rows = 0;     // rows of the band already there
+    std::vector<std::int32_t> samples;   // (m + 1) rows
+    std::vector<ParentRecord> parents;   // by tile column
+};
+
+class Builder {
+public:
+    explicit Builder(const HeightPyramidJob& job)
+        : job_(job), lattice_(job.lattice), m_(job.lattice.tile_cells()), n_(job.lattice.tile_cells_log2), corners_(job.lattice) {
+        result_.tiles = TileSet(lattice_, lattice_.deepest_level);
+        result_.min_n = std::numeric_limits<std::int32_t>::max();
+        result_.max_n = std::numeric_limits<std::int32_t>::min();
+        for (int level = 0; level <= lattice_.deepest_level; ++level) {
+            LevelBand band;
+            band.step = lattice_.step(level);
+            const std::int64_t extent = lattice_.tile_extent(level);
+            band.columns = (lattice_.cells_x + extent - 1) / extent;
+            band.width = band.columns * m_ + 1;
+            band.samples.resize(static_cast<std::size_t>((m_ + 1) * band.width));
+            band.parents.resize(static_cast<std::size_t>(band.columns));
+            levels_.push_back(std::move(band));
+        }
+        valid_.resize(static_cast<std::size_t>((m_ + 1) * (lattice_.cells_x + 1)));
+        raw_.resize(static_cast<std::size_t>(lattice_.cells_x + 1));
+        row_.resize(levels_.back().samples.size() / static_cast<std::size_t>(m_ + 1));
+    }
+
+    Result<HeightPyramidResult> run() {
+        if (auto ok = gather_corners(); !ok) return ok.error();
+        const std::int64_t padded = (lattice_.cells_y + m_ - 1) / m_ * m_;
+        for (std::int64_t j = 0; j <= padded; ++j)
+            if (auto ok = push_row(j); !ok) return ok.error();
+        if (auto ok = flush(); !ok) return ok.error();
+        return std::move(result_);
+    }
+
+private:
+    Result<void> gather_corners() {
+        std::vector<std::uint8_t> valid(static_cast<std::size_t>(lattice_.cells_x + 1));
+        for (std::int64_t r = 0; r < corners_.rows(); ++r) {
+            const std::int64_t j = std::min(r * m_, lattice_.cells_y);
+            if (auto ok = job_.spool->read_row(j, raw_, valid); !ok) return ok;
+            for (std::int64_t c = 0; c < corners_.columns(); ++c)
+                corners_.at(c, r) = job_.quantizer.quantize(raw_[static_cast<std::size_t>(std::min(c * m_, lattice_.cells_x))]);
+        }
+        return {};
+    }
+
+    // Row j of the padded lattice enters the deepest band and every coarser one that samples it.
+    Result<void> push_row(std::int64_t j) {
+        LevelBand& deepest = levels_.back();
+        std::uint8_t* valid = valid_.data() + deepest.rows * (lattice_.cells_x + 1);
+        if (j <= lattice_.cells_y) {
+            if (auto ok = job_.spool->read_row(j, raw_, {valid, static_cast<std::size_t>(lattice_.cells_x + 1)}); !ok) return ok;
+            quantize_row(valid);
+            if (job_.on_rows && !job_.on_rows(j + 1)) return Error{ErrorCode::interrupted, "stopped"};
+        } else {
+            std::fill(valid, valid + lattice_.cells_x + 1, std::uint8_t{0});
+        }
+        for (int level = lattice_.deepest_level; level >= 0; --level) {
+            LevelBand& band = levels_[static_cast<std::size_t>(level)];
+            if (j % band.step != 0) break;
+            if (auto ok = append(level, band); !ok) return ok;
+        }
+        return {};
+    }
+
+    void quantize_row(const std::uint8_t* valid) {
+        const std::int64_t width = lattice_.cells_x + 1;
+        const HeightQuantizer& q = job_.quantizer;
+        for (std::int64_t i = 0; i < width; ++i) {
+            const double raw = raw_[static_cast<std::size_t>(i)];
+            const std::int32_t value = q.quantize(raw);
+            row_[static_cast<std::size_t>(i)] = value;
+            if (valid[i] != 0) {
+                result_.min_n = std::min(result_.min_n, value);
+                result_.max_n = std::max(result_.max_n, value);
+                result_.worst_quantum_error_m =
+                    std::max(result_.worst_quantum_error_m, std::abs(q.metres(raw) - (q.height_offset_m + value * q.quantum_m)));
+            }
+        }
+        std::fill(row_.begin() + width, row_.end(), row_[static_cast<std::size_t>(width - 1)]);
+    }
+
+    // Appends the current row, subsampled, to a level's band; a full band is turned into tiles and its last row carried over.
+    Result<void> append(int level, LevelBand& band) {
+        std::int32_t* out = band.samples.data() + band.rows * band.width;
+        const std::int64_t last = static_cast<std::int64_t>(row_.size()) - 1;
+        for (std::int64_t i = 0; i < band.width; ++i) out[i] = row_[static_cast<std::size_t>(std::min(i * band.step, last))];
+        if (++band.rows <= m_) return {};
+        auto ok = level == lattice_.deepest_level ? emit_deepest(band) : emit_coarser(level, band);
+        if (!ok) return ok;
+        std::copy_n(band.samples.data() + m_ * band.width, band.width, band.samples.data());
+        if (level == lattice_.deepest_level)
+            std::copy_n(valid_.data() + m_ * (lattice_.cells_x + 1), lattice_.cells_x + 1, valid_.data());
+        band.rows = 1;
+        ++band.band;
+        std::fill(band.parents.begin(), band.parents.end(), ParentRecord{});
+        return {};
+    }
+
+    // Bands that the last row left incomplete repeat it, from the deepest level up so that children come first.
+    Result<void> flush() {
+        for (int level = lattice_.deepest_level - 1; level >= 0; --level) {
+            LevelBand& band = levels_[static_cast<std::size_t>(level)];
+            while (band.band * lattice_.tile_extent(level) < lattice_.cells_y)
+                if (auto ok = append(level, band); !ok) return ok;
+        }
+        return {};
+    }
+
+    void copy_samples(const LevelBand& band, std::int64_t column, std::vector<std::int32_t>& out) const {
+        out.resize(static_cast<std::size_t>((m_ + 1) * (m_ + 1)));
+        for (std::int64_t r = 0; r <= m_; ++r)
+            std::copy_n(band.samples.data() + r * band.width + column * m_, m_ + 1, out.data() + r * (m_ + 1));
+    }
+
+    std::vector<std::uint8_t> cell_presence(std::int64_t column, std::int64_t& count) const {
+        std::vector<std::uint8_t> cells(static_cast<std::size_t>(m_ * m_));
+        count = 0;
+        const std::int64_t width = lattice_.cells_x + 1;
+        for (std::int64_t r = 0; r < m_; ++r)
+            for (std::int64_t c = 0; c < m_; ++c) {
+                const std::int64_t i = column * m_ + c;
+                if (i >= lattice_.cells_x) continue;
+                const std::uint8_t* v = valid_.data() + r * width + i;
+                const std::uint8_t present = v[0] & v[1] & v[width] & v[width + 1];
+                cells[static_cast<std::size_t>(r * m_ + c)] = present;
+                count += present;
+            }
+        return cells;
+    }
+
+    TileRecord make_deepest(const LevelBand& band, std::int64_t column) const {
+        TileRecord record;
+        HeightTile tile;
+        tile.presence = cell_presence(column, record.present_cells);
+        if (record.present_cells == 0) return record;
+        record.exists = true;
+        copy_samples(band, column, tile.samples);
+        if (record.present_cells == m_ * m_) tile.presence.clear();
+        const auto vertices = present_vertices(tile.presence, n_);
+        const FinestVertices finest{tile.samples.data(), vertices.empty() ? nullptr : vertices.data(), n_};
+
+        const auto [low, high] = std::minmax_element(tile.samples.begin(), tile.samples.end());
+        record.bounds.min_n = *low;
+        record.bounds.max_n = *high;
+        const auto errors = leaf_errors(finest);
+        for (int g = 0; g < n_; ++g)
+            record.bounds.error_n[static_cast<std::size_t>(g)] = round_up_to_float(errors[static_cast<std::size_t>(g)]);
+
+        const std::int64_t i = column * m_, j = band.band * m_;
+        for (int level = 0; level < lattice_.deepest_level; ++level) {
+            const std::int64_t extent = lattice_.tile_extent(level), stride = extent / 2;
+            const std::int64_t bi = i / extent * extent, bj = j / extent * extent;
+            BlockVertices block{};
+            for (std::int64_t k = 0; k < 9; ++k)
+                block[static_cast<std::size_t>(k)] = corners_.vertex(bi + k % 3 * stride, bj + k / 3 * stride);
+            record.ancestor_error[static_cast<std::size_t>(level)] = coarse_block_error(block, stride, i - bi, j - bj, finest);
+        }
+        tile.header.own = record.bounds;
+        record.payload = encode_height_tile(tile, n_, HeightCodec::plane);
+        return record;
+    }
+
+    Result<void> emit_deepest(const LevelBand& band) {
+        const int level = lattice_.deepest_level;
+        std::vector<TileRecord> records(static_cast<std::size_t>(band.columns));
+        tbb::parallel_for(std::int64_t{0}, band.columns,
+                          [&](std::int64_t x) { records[static_cast<std::size_t>(x)] = make_deepest(band, x); });
+        for (std::int64_t x = 0; x < band.columns; ++x) {
+            const TileRecord& record = records[static_cast<std::size_t>(x)];
+            if (!record.exists) continue;
+            const TileId id{level, x, band.band};
+            result_.present_cells += record.present_cells;
+            for (int up = 0; up < level; ++up) {
+                ParentRecord& ancestor =
+                    levels_[static_cast<std::size_t>(up)].parents[static_cast<std::size_t>(x >> (level - up))];
+                ancestor.coarsest_error = std::max(ancestor.coarsest_error, record.ancestor_error[static_cast<std::size_t>(up)]);
+            }
+            if (auto ok = store(id, record.bounds, record.payload); !ok) return ok;
+        }
+        return {};
+    }
+
+    Result<void> emit_coarser(int level, const LevelBand& band) {
+        std::vector<TileRecord> records(static_cast<std::size_t>(band.columns));
+        tbb::parallel_for(std::int64_t{0}, band.columns, [&](std::int64_t x) {
+            const ParentRecord& parent = band.parents[static_cast<std::size_t>(x)];
+            if (parent.child_mask != 0) records[static_cast<std::size_t>(x)] = make_coarser(band, x, parent);
+        });
+        for (std::int64_t x = 0; x < band.columns; ++x) {
+            const TileRecord& record = records[static_cast<std::size_t>(x)];
+            if (record.exists)
+                if (auto ok = store({level, x, band.band}, record.bounds, record.payload); !ok) return ok;
+        }
+        return {};
+    }
+
+    TileRecord make_coarser(const LevelBand& band, std::int64_t column, const ParentRecord& parent) const {
+        TileRecord record;
+        record.exists = true;
+        HeightTile tile;
+        copy_samples(band, column, tile.samples);
+        const auto [low, high] = std::minmax_element(tile.samples.begin(), tile.samples.end());
+        record.bounds.min_n = *low;
+        record.bounds.max_n = *high;
+        for (int q = 0; q < 4; ++q) {
+            if ((parent.child_mask >> q & 1) == 0) continue;
+            const HeightBounds& child = parent.children[static_cast<std::size_t>(q)];
+            record.bounds.min_n = std::min(record.bounds.min_n, child.min_n);
+            record.bounds.max_n = std::max(record.bounds.max_n, child.max_n);
+            for (int g = 0; g + 1 < n_; ++g) {
+                float& error = record.bounds.error_n[static_cast<std::size_t>(g)];
+                error = std::max(error, child.error_n[static_cast<std::size_t>(g + 1)]);
+            }
+        }
+        float& coarsest = record.bounds.error_n[static_cast<std::size_t>(n_ - 1)];
+        coarsest = round_up_to_float(parent.coarsest_error);
+        for (int g = 1; g < n_; ++g) {
+            float& error = record.bounds.error_n[static_cast<std::size_t>(g)];
+            error = std::max(error, record.bounds.error_n[static_cast<std::size_t>(g - 1)]);
+        }
+        tile.header.child_mask = parent.child_mask;
+        tile.header.own = record.bounds;
+        tile.header.children = parent.children;
+        record.payload = encode_height_tile(tile, n_, HeightCodec::plane);
+        return record;
+    }
+
+    Result<void> store(TileId id, const HeightBounds& bounds, const std::vector<std::uint8_t>& payload) {
+        result_.tiles.insert(id);
+        ++result_.tile_count;
+        if (id.level > 0) {
+            LevelBand& band = levels_[static_cast<std::size_t>(id.level - 1)];
+            ParentRecord& parent = band.parents[static_cast<std::size_t>(id.x >> 1)];
+            const int q = quadrant_of(id);
+            parent.child_mask = static_cast<std::uint8_t>(parent.child_mask | (1 << q));
+            parent.children[static_cast<std::size_t>(q)] = bounds;
+        }
+        return job_.writer->put(TileKind::height, *tile_key(lattice_, id), static_cast<int>(HeightCodec::plane), payload);
+    }
+
+    const HeightPyramidJob& job_;
+    const Lattice lattice_;
+    const std::int64_t m_;
+    const int n_;
+    CornerGrid corners_;
+    std::vector<LevelBand> levels_;
+    std::vector<std::uint8_t> valid_;  // (m + 1) rows of the deepest band
+    std::vector<double> raw_;
+    std::vector<std::int32_t> row_;    // current row, padded
+    HeightPyramidResult result_;
+};
+
+}  // namespace
+
+std::int64_t height_pyramid_bytes(const Lattice& lattice) {
+    const std::int64_t m = lattice.tile_cells();
+    const std::int64_t width = lattice.cells_x + 2 * m;
+    const std::int64_t bands = 2 * (m + 1) * width * 4 + (m + 1) * width;
+    const std::int64_t corners = (lattice.cells_x / m + 2) * (lattice.cells_y / m + 2) * 4;
+    const std::int64_t records = width / m * static_cast<std::int64_t>(sizeof(TileRecord) + 2 * sizeof(ParentRecord) + 4096);
+    return bands + corners + records + width * 12 + (std::int64_t{2} << 20);
+}
+
+Result<HeightPyramidResult> build_height_pyramid(const HeightPyramidJob& job) { return Builder(job).run(); }
+
+}  // namespace scree

@@ -1,0 +1,38 @@
+// Builds the height pyramid in one pass over the spool, band by band from north to south: deepest tiles as their rows
+// arrive, coarser tiles as soon as their last row is known. Memory: one band of (m+1) rows a level, about twice the finest.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+
+#include "common/dataset.h"
+#include "common/store/sqlite_store.h"
+#include "tools/pyramid/height_quantizer.h"
+#include "tools/pyramid/height_spool.h"
+#include "tools/pyramid/tile_set.h"
+
+namespace scree {
+
+struct HeightPyramidJob {
+    HeightSpool* spool = nullptr;
+    SqliteStoreWriter* writer = nullptr;
+    Lattice lattice;
+    HeightQuantizer quantizer;
+    std::function<bool(std::int64_t rows_done)> on_rows;  ///< returns false to stop
+};
+
+struct HeightPyramidResult {
+    TileSet tiles;
+    std::int64_t tile_count = 0;
+    std::int64_t present_cells = 0;
+    std::int32_t min_n = 0, max_n = 0;  ///< over valid samples
+    double worst_quantum_error_m = 0;   ///< over valid samples
+};
+
+/// Bytes that build_height_pyramid holds.
+std::int64_t height_pyramid_bytes(const Lattice& lattice);
+
+Result<HeightPyramidResult> build_height_pyramid(const HeightPyramidJob& job);
+
+}  // namespace scree

@@ -1,0 +1,255 @@
+#include "tools/pyramid/texture_pyramid.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cstring>
+#include <vector>
+
+#include "common/store/texture_codec.h"
+#include "tools/pyramid/bc1_encoder.h"
+#include "tools/pyramid/texture_filter.h"
+
+namespace scree {
+namespace {
+
+constexpr int kRowsPerPush = 16;        // 16 rows of 64 K texels are 4 MB
+constexpr std::int64_t kChunkBlocks = 512;  // blocks of a row encoded by one task: 8 K texels, about 50 us
+
+std::int64_t round_up(std::int64_t v, std::int64_t multiple) { return (v + multiple - 1) / multiple * multiple; }
+
+// Texels of the data's extent at texture level `level`, rounded up.
+std::int64_t texels(std::int64_t cells, const Lattice& lattice, int size_log2, int level) {
+    const int shift = lattice.deepest_level - level + lattice.tile_cells_log2 - size_log2;  // log2 cells a texel
+    return shift >= 0 ? (cells + (std::int64_t{1} << shift) - 1) >> shift : cells << -shift;
+}
+
+// One level of the pyramid, or (below level 0) a mip of the roots.
+struct Level {
+    int id = 0;               // may be negative
+    std::int64_t width = 0;   // texels
+    std::int64_t band_rows = 0;  // texel rows of a band of tiles
+    int capacity = 4;         // rows gathered before they are encoded
+    int gathered = 0;
+    std::int64_t rows_done = 0;
+    std::vector<std::uint8_t> rows;    // capacity * width RGBA
+    std::vector<std::uint8_t> blocks;  // band_rows/4 * width/4 BC1 blocks
+};
+
+}  // namespace
+
+struct TexturePyramid::Impl {
+    TexturePyramidJob job;
+    std::int64_t size = 256;
+    std::vector<Level> levels;  // deepest first
+    TileSet deep_tiles;         // existence of tiles below the height pyramid's depth, by texture level
+    std::int64_t tiles_written = 0;
+
+    Level& level_of(int id) { return levels[static_cast<std::size_t>(job.deepest_level - id)]; }
+
+    void encode(Level& level) {
+        const std::int64_t block_columns = level.width / 4;
+        const std::int64_t block_rows = level.gathered / 4;
+        const std::int64_t first_row = (level.rows_done % level.band_rows) / 4;
+        const std::int64_t chunks = (block_columns + kChunkBlocks - 1) / kChunkBlocks;
+        tbb::parallel_for(std::int64_t{0}, block_rows * chunks, [&](std::int64_t task) {
+            const std::int64_t row = task / chunks, from = task % chunks * kChunkBlocks;
+            const std::int64_t count = std::min(kChunkBlocks, block_columns - from);
+            encode_bc1_row(level.rows.data() + (row * 4 * level.width + from * 4) * 4, static_cast<std::size_t>(level.width * 4),
+                           static_cast<std::size_t>(count),
+                           level.blocks.data() + ((first_row + row) * block_columns + from) * 8);
+        });
+    }
+
+    // All gathered rows of a level are encoded and halved into the next coarser one.
+    void process(std::size_t index) {
+        Level& level = levels[index];
+        encode(level);
+        level.rows_done += level.gathered;
+        if (index + 1 < levels.size()) {
+            Level& next = levels[index + 1];
+            if (next.gathered == next.capacity) next.gathered = 0;
+            const std::int64_t pairs = level.gathered / 2;
+            std::uint8_t* out = next.rows.data() + next.gathered * next.width * 4;
+            tbb::parallel_for(std::int64_t{0}, pairs, [&](std::int64_t p) {
+                const std::uint8_t* upper = level.rows.data() + 2 * p * level.width * 4;
+                downsample_rgba_row(upper, upper + level.width * 4, level.width / 2, out + p * next.width * 4);
+                std::memset(out + p * next.width * 4 + level.width / 2 * 4, 0,
+                            static_cast<std::size_t>((next.width - level.width / 2) * 4));
+            });
+            next.gathered += static_cast<int>(pairs);
+            if (next.gathered == next.capacity) process(index + 1);
+        }
+    }
+
+    bool exists(TileId id) const {
+        if (id.level <= job.lattice.deepest_level) return job.height_tiles->contains(id);
+        return deep_tiles.contains(id);
+    }
+    std::uint8_t child_mask(TileId id) const {
+        std::uint8_t mask = 0;
+        if (id.level < job.deepest_level)
+            for (int q = 0; q < 4; ++q)
+                if (exists(child_of(id, q))) mask = static_cast<std::uint8_t>(mask | (1 << q));
+        return mask;
+    }
+
+    TextureTile assemble(TileId id) {
+        TextureTile tile;
+        const int log2 = job.texture_size_log2;
+        tile.blocks.resize(bc1_chain_bytes(log2));
+        for (int mip = 0; log2 - mip >= 2; ++mip) {
+            const Level& level = level_of(id.level - mip);
+            const std::int64_t side = size >> mip, blocks = side / 4;
+            const std::int64_t row0 = (id.y * side % level.band_rows) / 4, column0 = id.x * blocks;
+            std::uint8_t* out = tile.blocks.data() + bc1_mip_offset(log2, mip);
+            for (std::int64_t r = 0; r < blocks; ++r)
+                std::memcpy(out + r * blocks * 8, level.blocks.data() + ((row0 + r) * (level.width / 4) + column0) * 8,
+                            static_cast<std::size_t>(blocks * 8));
+        }
+        // The last two mips: from the four gathered rows in which the 4 x 4 mip has just been completed.
+        const Level& level = level_of(id.level - (log2 - 2));
+        std::array<std::uint8_t, 16> two{};
+        std::array<std::uint8_t, 4> one{};
+        const std::uint8_t* pixels = level.rows.data() + (level.gathered - 4) * level.width * 4 + id.x * 16;
+        for (int r = 0; r < 2; ++r)
+            downsample_rgba_row(pixels + 2 * r * level.width * 4, pixels + (2 * r + 1) * level.width * 4, 2, two.data() + 8 * r);
+        downsample_rgba_row(two.data(), two.data() + 8, 1, one.data());
+        std::array<std::uint8_t, 64> repeated{};
+        for (std::size_t t = 0; t < 16; ++t)
+            std::memcpy(repeated.data() + 4 * t, two.data() + 4 * ((t / 4 % 2) * 2 + t % 2), 4);
+        encode_bc1_row(repeated.data(), 16, 1, tile.blocks.data() + bc1_mip_offset(log2, log2 - 1));
+        for (std::size_t t = 0; t < 16; ++t) std::memcpy(repeated.data() + 4 * t, one.data(), 4);
+        encode_bc1_row(repeated.data(), 16, 1, tile.blocks.data() + bc1_mip_offset(log2, log2));
+        return tile;
+    }
+
+    static bool any_opaque(const TextureTile& tile, int log2) {
+        const std::uint8_t* b = tile.blocks.data() + bc1_mip_offset(log2, 0);
+        for (std::size_t k = 0; k < bc1_mip_bytes(log2, 0); k += 8) {
+            const unsigned c0 = b[k] | b[k + 1] << 8, c1 = b[k + 2] | b[k + 3] << 8;
+            if (c0 > c1) return true;
+            for (std::size_t s = 4; s < 8; ++s)
+                for (int t = 0; t < 8; t += 2)
+                    if ((b[k + s] >> t & 3) != 3) return true;
+        }
+        return false;
+    }
+
+    // Every level whose band the last rows completed is turned into tiles, finest first: a tile's mips stand in the coarser
+    // levels' blocks, which are reused only after their own band is complete.
+    Result<void> emit() {
+        for (std::size_t index = 0; index < levels.size() && levels[index].id >= 0; ++index) {
+            Level& level = levels[index];
+            if (level.rows_done == 0 || level.rows_done % level.band_rows != 0 || level.gathered != level.capacity) break;
+            const std::int64_t y = level.rows_done / level.band_rows - 1;
+            if (auto ok = emit_band(level, y); !ok) return ok;
+        }
+        return {};
+    }
+
+    Result<void> emit_band(Level& level, std::int64_t y) {
+        const std::int64_t columns = level.width / size;
+        const bool deep = level.id > job.lattice.deepest_level;
+        std::vector<std::vector<std::uint8_t>> payloads(static_cast<std::size_t>(columns));
+        tbb::parallel_for(std::int64_t{0}, columns, [&](std::int64_t x) {
+            const TileId id{level.id, x, y};
+            if (!deep && !exists(id)) return;
+            TextureTile tile = assemble(id);
+            if (deep && !any_opaque(tile, job.texture_size_log2)) return;
+            tile.child_mask = child_mask(id);
+            payloads[static_cast<std::size_t>(x)] = encode_texture_tile(tile, job.texture_size_log2, TextureCodec::split);
+        });
+        for (std::int64_t x = 0; x < columns; ++x) {
+            const auto& payload = payloads[static_cast<std::size_t>(x)];
+            if (payload.empty()) continue;
+            const TileId id{level.id, x, y};
+            if (deep) deep_tiles.insert(id);
+            ++tiles_written;
+            if (auto ok = job.writer->put(TileKind::texture, *tile_key(job.lattice, id), static_cast<int>(TextureCodec::split),
+                                          payload);
+                !ok)
+                return ok;
+        }
+        return {};
+    }
+};
+
+TexturePyramid::TexturePyramid(const TexturePyramidJob& job) : impl_(std::make_unique<Impl>()) {
+    impl_->job = job;
+    impl_->size = std::int64_t{1} << job.texture_size_log2;
+    const std::int64_t size = impl_->size;
+    std::int64_t width = round_up(texels(job.lattice.cells_x, job.lattice, job.texture_size_log2, job.deepest_level), size);
+    int capacity = static_cast<int>(std::min<std::int64_t>(kRowsPerPush, size));
+    const int coarsest = -(job.texture_size_log2 - 2);
+    for (int id = job.deepest_level; id >= coarsest; --id) {
+        Level level;
+        level.id = id;
+        level.width = width;
+        level.band_rows = id >= 0 ? size : size >> -id;
+        level.capacity = capacity;
+        level.rows.resize(static_cast<std::size_t>(capacity * width * 4));
+        level.blocks.resize(static_cast<std::size_t>(level.band_rows / 4 * (width / 4) * 8));
+        impl_->levels.push_back(std::move(level));
+        width = id > 0 ? round_up(width / 2, size) : width / 2;
+        capacity = std::max(4, capacity / 2);
+    }
+    if (job.deepest_level > job.lattice.deepest_level) {
+        Lattice deep = job.lattice;  // the same extent on a finer lattice: only counts of tiles are taken from it
+        const int extra = job.deepest_level - job.lattice.deepest_level;
+        deep.deepest_level += extra;
+        deep.cells_x <<= extra;
+        deep.cells_y <<= extra;
+        impl_->deep_tiles = TileSet(deep, job.deepest_level);
+    }
+}
+
+TexturePyramid::~TexturePyramid() = default;
+
+std::int64_t TexturePyramid::width() const { return impl_->levels.front().width; }
+std::int64_t TexturePyramid::height() const {
+    const auto& job = impl_->job;
+    return round_up(texels(job.lattice.cells_y, job.lattice, job.texture_size_log2, job.deepest_level), impl_->size);
+}
+int TexturePyramid::rows_per_push() const { return impl_->levels.front().capacity; }
+std::uint8_t* TexturePyramid::rows() { return impl_->levels.front().rows.data(); }
+
+Result<void> TexturePyramid::push() {
+    impl_->levels.front().gathered = impl_->levels.front().capacity;
+    impl_->process(0);
+    return impl_->emit();
+}
+
+Result<std::int64_t> TexturePyramid::finish() {
+    // Levels whose band is incomplete are filled up with transparent rows, finest first.
+    for (std::size_t index = 1; index < impl_->levels.size(); ++index) {
+        Level& level = impl_->levels[index];
+        const std::int64_t complete = level.id >= 0 ? impl_->size : level.band_rows;
+        while ((level.rows_done + (level.gathered == level.capacity ? 0 : level.gathered)) % complete != 0) {
+            if (level.gathered == level.capacity) level.gathered = 0;
+            std::memset(level.rows.data() + level.gathered * level.width * 4, 0,
+                        static_cast<std::size_t>((level.capacity - level.gathered) * level.width * 4));
+            level.gathered = level.capacity;
+            impl_->process(index);
+            for (std::size_t done = index; done < impl_->levels.size() && impl_->levels[done].id >= 0; ++done) {
+                Level& l = impl_->levels[done];
+                if (l.rows_done % l.band_rows != 0 || l.gathered != l.capacity) break;
+                if (auto ok = impl_->emit_band(l, l.rows_done / l.band_rows - 1); !ok) return ok.error();
+            }
+        }
+    }
+    return impl_->tiles_written;
+}
+
+std::int64_t TexturePyramid::bytes_needed(const Lattice& lattice, int texture_size_log2, int deepest_level) {
+    const std::int64_t size = std::int64_t{1} << texture_size_log2;
+    const std::int64_t width = round_up(texels(lattice.cells_x, lattice, texture_size_log2, deepest_level), size);
+    const std::int64_t rows = 2 * kRowsPerPush * width * 4;
+    const std::int64_t blocks = 2 * size / 2 * width;           // half a byte a texel, all levels
+    const std::int64_t payloads = size / 2 * width * 4 / 3 * 2;  // a band of tiles, assembled and packed
+    return rows + blocks + payloads + (std::int64_t{4} << 20);
+}
+
+}  // namespace scree
