@@ -1,0 +1,39 @@
+// Audit: the truth about drawn frames, from the finest data. For every finest vertex of a present cell in view, the distance
+// in pixels between its projection and that of the drawn surface above or below it; occlusion is ignored, so it is an upper
+// figure (Scree lod, test data).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+
+#include "common/store/tile_store.h"
+#include "runtime/app/cpu_arena.h"
+#include "runtime/app/drawn_mesh.h"
+#include "runtime/lod/draw_list.h"
+#include "runtime/view/camera.h"
+
+namespace scree {
+
+class ErrorHistogram {
+public:
+    void add(double px);
+    void merge(const ErrorHistogram& other);
+    std::int64_t count() const { return count_; }
+    double max() const { return max_; }
+    double mean() const { return count_ > 0 ? sum_ / static_cast<double>(count_) : 0; }
+    /// Upper end of the bin that holds the quantile; bins are 0.4 % wide.
+    double quantile(double q) const;
+
+private:
+    static constexpr int kBins = 8192;
+    std::array<std::int64_t, kBins> bins_{};
+    std::int64_t count_ = 0;
+    double max_ = 0, sum_ = 0;
+};
+
+/// Adds one drawn frame. Errors: those of the store.
+Result<void> audit_frame(const TileStore& store, TileReader& reader, const Camera& camera, const DrawList& draws,
+                         const CpuArena& arena, ErrorHistogram& errors);
+
+}  // namespace scree

@@ -1,0 +1,59 @@
+#include "runtime/app/display.h"
+
+#include <algorithm>
+
+namespace scree {
+
+FrameSettings scenery(const Dataset& d) {
+    FrameSettings s;
+    const double extent = static_cast<double>(std::max(d.lattice.cells_x, d.lattice.cells_y)) * d.lattice.spacing_m;
+    s.haze_distance_m = 1.6 * extent;
+    s.haze_scale_height_m = std::max(0.08 * extent, d.max_height_m - d.min_height_m);
+    s.ground_height_m = d.min_height_m;
+    return s;
+}
+
+Result<std::unique_ptr<Display>> Display::create(const Scene& scene, const DisplayOptions& o) {
+    const Dataset& d = scene.dataset();
+    std::unique_ptr<Display> display(new Display);
+    auto context = o.window ? create_window_context({"Scree", o.width_px, o.height_px, o.wait_for_refresh, o.visible_window})
+                            : create_headless_context();
+    if (!context) return context.error();
+    display->context_ = std::move(*context);
+    RendererOptions options;
+    options.lattice = d.lattice;
+    options.height_offset_m = d.height_offset_m;
+    options.height_quantum_m = d.height_quantum_m;
+    options.texture_size_log2 = d.texture_size_log2;
+    options.height_slots = static_cast<int>(scene.memory().height_slots);
+    options.texture_slots = static_cast<int>(scene.memory().texture_slots);
+    options.max_draws = options.height_slots;
+    auto renderer = Renderer::create(options);
+    if (!renderer) return renderer.error();
+    display->renderer_ = std::move(*renderer);
+    display->samples_ = o.samples;
+    if (auto ok = display->resize(o.width_px, o.height_px); !ok) return ok.error();
+    if (o.keep_heights) display->arena_ = std::make_unique<CpuArena>(d, scene.memory().height_slots);
+    display->settings_ = scenery(d);
+    return display;
+}
+
+void Display::put_height(std::int32_t slot, std::span<const SlotVertex> vertices) {
+    renderer_->upload_height(slot, vertices);
+    if (arena_) arena_->put_height(slot, vertices);
+}
+
+void Display::put_texture(std::int32_t slot, std::span<const std::uint8_t> chain) { renderer_->upload_texture(slot, chain); }
+
+Result<void> Display::resize(int width_px, int height_px) {
+    auto target = RenderTarget::create({width_px, height_px, samples_});
+    if (!target) return target.error();
+    target_ = std::make_unique<RenderTarget>(std::move(*target));
+    return {};
+}
+
+FrameTimes Display::draw(const Camera& camera, const DrawList& draws) {
+    return renderer_->draw(camera, draws, settings_, *target_);
+}
+
+}  // namespace scree

@@ -1,0 +1,52 @@
+// Display: a context, a renderer and a target for one scene, with or without a window; the sink that tiles arrive in.
+#pragma once
+
+#include <memory>
+#include <span>
+
+#include "runtime/app/cpu_arena.h"
+#include "runtime/app/scene.h"
+#include "runtime/render/context.h"
+#include "runtime/render/renderer.h"
+
+namespace scree {
+
+struct DisplayOptions {
+    int width_px = 800;
+    int height_px = 800;
+    bool window = false;
+    bool visible_window = true;
+    bool wait_for_refresh = false;
+    bool keep_heights = false;  ///< also a CpuArena, for --mesh
+    int samples = 0;
+};
+
+class Display final : public TileSink {
+public:
+    static Result<std::unique_ptr<Display>> create(const Scene& scene, const DisplayOptions& options);
+
+    void put_height(std::int32_t slot, std::span<const SlotVertex> vertices) override;
+    void put_texture(std::int32_t slot, std::span<const std::uint8_t> chain) override;
+
+    GlContext& context() { return *context_; }
+    Renderer& renderer() { return *renderer_; }
+    RenderTarget& target() { return *target_; }
+    const CpuArena* arena() const { return arena_.get(); }
+    FrameSettings& frame_settings() { return settings_; }
+    Result<void> resize(int width_px, int height_px);
+    FrameTimes draw(const Camera& camera, const DrawList& draws);
+
+private:
+    Display() = default;
+    std::unique_ptr<GlContext> context_;  // goes last
+    std::unique_ptr<Renderer> renderer_;
+    std::unique_ptr<RenderTarget> target_;
+    std::unique_ptr<CpuArena> arena_;
+    FrameSettings settings_;
+    int samples_ = 0;
+};
+
+/// Haze, sun and ground plane that suit a dataset's size.
+FrameSettings scenery(const Dataset& dataset);
+
+}  // namespace scree

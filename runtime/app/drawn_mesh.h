@@ -1,0 +1,38 @@
+// The drawn triangles as lattice integers: what audits check for cracks and `shot --mesh` writes for others to check.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/dataset.h"
+#include "common/mesh/tile_patterns.h"
+#include "runtime/app/cpu_arena.h"
+#include "runtime/lod/draw_list.h"
+
+namespace scree {
+
+struct LatticeVertex {
+    std::int32_t i = 0, j = 0, n = 0;
+    friend auto operator<=>(const LatticeVertex&, const LatticeVertex&) = default;
+};
+
+struct DrawnMesh {
+    std::vector<LatticeVertex> corners;  ///< three a triangle, counter-clockwise from above
+};
+
+DrawnMesh drawn_mesh(const Dataset& dataset, const TilePatterns& patterns, const DrawList& draws, const CpuArena& arena);
+
+struct CrackReport {
+    std::int64_t edges = 0;        ///< sides of triangles, each triangle's three
+    std::int64_t open_edges = 0;   ///< not shared by exactly two triangles although terrain is drawn on both sides
+    std::int64_t t_junctions = 0;  ///< open edges with a vertex of another triangle inside them
+};
+
+/// Counts cracks. Edges on the border of what is drawn (culled, absent, end of the data) are no cracks.
+CrackReport count_cracks(const Dataset& dataset, const DrawList& draws, const DrawnMesh& mesh);
+
+/// Binary PLY, vertices as doubles in the dataset's coordinates, shared between triangles. Whole or absent.
+Result<void> write_ply(const std::string& file, const Dataset& dataset, const DrawnMesh& mesh);
+
+}  // namespace scree

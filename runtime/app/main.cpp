@@ -1,0 +1,39 @@
+// scree-view: the runtime program. `scree-view STORE` opens the window; shot, fly and audit are commands.
+#include <fmt/format.h>
+
+#include <array>
+#include <exception>
+#include <new>
+#include <string>
+#include <string_view>
+
+#include "runtime/app/commands.h"
+
+namespace {
+
+struct Command {
+    std::string_view name;
+    int (*run)(int, char**);
+};
+
+constexpr std::array<Command, 3> kCommands{{{"shot", scree::run_shot}, {"fly", scree::run_fly}, {"audit", scree::run_audit}}};
+
+int dispatch(int argc, char** argv) {
+    const std::string_view name = argc > 1 ? argv[1] : "";
+    for (const Command& c : kCommands)
+        if (c.name == name) return c.run(argc - 1, argv + 1);
+    return scree::run_view(argc, argv);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    try {
+        return dispatch(argc, argv);
+    } catch (const std::bad_alloc&) {
+        fmt::print(stderr, "scree-view: out of memory\n");
+    } catch (const std::exception& error) {
+        fmt::print(stderr, "scree-view: {}\n", error.what());
+    }
+    return 5;
+}

@@ -1,0 +1,63 @@
+// Scene: a store with everything needed to choose and hold what is drawn of it: memory plan, pager, selector. No OpenGL: the
+// sink decides where tiles go. Frame-loop thread only.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "common/store/sqlite_store.h"
+#include "runtime/lod/selection.h"
+#include "runtime/paging/pager.h"
+
+namespace scree {
+
+struct SceneOptions {
+    std::int64_t budget_bytes = std::int64_t{256} << 20;  ///< ceiling of tile memory, staging included
+    double tau_px = 1;
+    double texture_tau_px = 1;
+    int loader_threads = 2;
+    int latency_ms = 0;
+    bool textures = true;
+    std::int64_t upload_bytes_per_frame = 4 << 20;  ///< about 90 textures; larger arrives sooner and may hitch
+};
+
+/// Times and counts of one frame's thinking, before anything is drawn.
+struct SceneFrame {
+    const Selection* selection = nullptr;
+    double select_ms = 0;
+    std::int64_t uploads = 0;
+    bool stand_ins = false;  ///< drawn coarser than full residency would
+};
+
+class Scene {
+public:
+    static Result<std::unique_ptr<Scene>> open(const SqliteStore& store, const SceneOptions& options);
+    /// Makes the pager with its sink (the sink's slots are sized by memory()).
+    Result<void> start(TileSink& sink);
+
+    const Dataset& dataset() const { return store_.dataset(); }
+    const TileStore& store() const { return store_; }
+    const MemoryPlan& memory() const { return memory_; }
+    const Pager& pager() const { return *pager_; }
+    SceneOptions& options() { return options_; }
+
+    /// One frame's arrivals, selection and requests. The selection is valid until the next call.
+    SceneFrame advance(std::span<const Camera> views);
+    /// The same until nothing is missing. Errors: ErrorCode::store if what is missing never comes.
+    Result<SceneFrame> complete(std::span<const Camera> views, const std::function<bool()>& stop = {});
+
+private:
+    Scene(const SqliteStore& store, const SceneOptions& options, const MemoryPlan& memory);
+    SceneFrame think(std::span<const Camera> views);
+
+    const SqliteStore& store_;
+    SceneOptions options_;
+    MemoryPlan memory_;
+    std::unique_ptr<Pager> pager_;
+    Selector selector_;
+};
+
+}  // namespace scree

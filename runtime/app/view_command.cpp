@@ -1,0 +1,138 @@
+#include <GLFW/glfw3.h>
+#include <fmt/format.h>
+
+#include <chrono>
+#include <filesystem>
+
+#include "common/report.h"
+#include "runtime/app/commands.h"
+#include "runtime/app/display.h"
+#include "runtime/app/fly_controls.h"
+#include "runtime/app/hud.h"
+#include "runtime/app/view_options.h"
+#include "runtime/view/ground.h"
+
+namespace scree {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// A key that acts once when it goes down.
+class KeyPress {
+public:
+    explicit KeyPress(int key) : key_(key) {}
+    bool pressed(GLFWwindow* window) {
+        const bool down = glfwGetKey(window, key_) == GLFW_PRESS;
+        const bool fresh = down && !was_down_;
+        was_down_ = down;
+        return fresh;
+    }
+
+private:
+    int key_;
+    bool was_down_ = false;
+};
+
+struct Keys {
+    KeyPress wireframe{GLFW_KEY_F}, levels{GLFW_KEY_L}, finer{GLFW_KEY_RIGHT_BRACKET}, coarser{GLFW_KEY_LEFT_BRACKET}, hud{GLFW_KEY_H};
+};
+
+HudLines status_lines(const Scene& scene, const SceneFrame& frame, const FlightPose& pose, double fps, double speed) {
+    const Selection& s = *frame.selection;
+    HudLines lines;
+    lines.title = fmt::format("{:.0f} fps   {} triangles in {} tiles", fps, s.triangles, s.nodes);
+    lines.body = fmt::format(
+        "within {:.2f} px{}{}\neye {:.0f}, {:.0f}, {:.0f} m   {:.0f} m/s\n\nW A S D Q E fly, drag to look, wheel: speed, Shift: faster\n"
+        "[ ] accuracy   F wireframe   L levels   H hide   Home   Esc",
+        s.max_bound_px, frame.stand_ins ? fmt::format(", loading {}", s.requests.size()) : "",
+        s.budget_limited ? ", limited by the budget" : "", pose.eye.x, pose.eye.y, pose.eye.z, speed);
+    lines.credit = scene.dataset().attribution;
+    return lines;
+}
+
+Result<void> view(ViewOptions o, double seconds) {
+    auto store = SqliteStore::open(o.store);
+    if (!store) return store.error();
+    auto scene = Scene::open(**store, scene_options(o));
+    if (!scene) return scene.error();
+    const Dataset& d = (*store)->dataset();
+    DisplayOptions display_options{o.width_px, o.height_px};
+    display_options.window = true;
+    display_options.wait_for_refresh = true;
+    auto display = Display::create(**scene, display_options);
+    if (!display) return display.error();
+    if (auto ok = (*scene)->start(**display); !ok) return ok;
+    auto ground = Ground::open(**store);
+    if (!ground) return ground.error();
+    GLFWwindow* window = (*display)->context().window();
+    glfwSetWindowTitle(window, fmt::format("Scree - {}", std::filesystem::path(o.store).filename().string()).c_str());
+    const double extent = static_cast<double>(std::max(d.lattice.cells_x, d.lattice.cells_y)) * d.lattice.spacing_m;
+    FlyControls controls(window, overview(d, o.fov_deg, static_cast<double>(o.width_px) / o.height_px), extent);
+    Hud hud(window);
+    Keys keys;
+    bool show_hud = true, redraw = true;
+    double fps = 0;
+    const auto start = Clock::now();
+    auto last = start;
+    while (glfwWindowShouldClose(window) == 0 && !interrupt_flag()) {
+        const auto now = Clock::now();
+        const double elapsed = std::chrono::duration<double>(now - last).count();
+        last = now;
+        if (seconds > 0 && std::chrono::duration<double>(now - start).count() > seconds) break;
+        if (glfwGetKey(window, GLFW_KEY_ESCAPE) == GLFW_PRESS) break;
+
+        int width = 0, height = 0;
+        glfwGetFramebufferSize(window, &width, &height);
+        if (width > 0 && height > 0 && (width != o.width_px || height != o.height_px)) {
+            o.width_px = std::min(width, 16384);
+            o.height_px = std::min(height, 16384);
+            if (auto ok = (*display)->resize(o.width_px, o.height_px); !ok) return ok;
+            redraw = true;
+        }
+        const FlightPose before = controls.pose();
+        auto under = (*ground)->height(before.eye.x, before.eye.y);
+        controls.move(std::min(elapsed, 0.1), under && *under ? **under : -1e9);
+        FrameSettings& settings = (*display)->frame_settings();
+        if (keys.wireframe.pressed(window)) settings.wireframe = !settings.wireframe, redraw = true;
+        if (keys.levels.pressed(window)) settings.colour_by_level = !settings.colour_by_level, redraw = true;
+        if (keys.finer.pressed(window)) (*scene)->options().tau_px *= 0.8, redraw = true;
+        if (keys.coarser.pressed(window)) (*scene)->options().tau_px *= 1.25, redraw = true;
+        if (keys.hud.pressed(window)) show_hud = !show_hud, redraw = true;
+
+        const FlightPose pose = controls.pose();
+        auto camera = camera_of(pose, o);
+        if (!camera) return camera.error();
+        const SceneFrame frame = (*scene)->advance({&*camera, 1});
+        if (!redraw && !controls.moved() && !frame.stand_ins && frame.uploads == 0) {
+            glfwWaitEventsTimeout(0.1);  // nothing changes: leave the core alone
+            continue;
+        }
+        redraw = frame.stand_ins;
+        (*display)->draw(*camera, frame.selection->draws[0]);
+        (*display)->target().blit_to_window(o.width_px, o.height_px);
+        fps = elapsed > 0 ? 0.9 * fps + 0.1 / elapsed : fps;
+        if (show_hud) hud.draw(status_lines(**scene, frame, pose, fps, controls.speed_m_per_s()));
+        (*display)->context().swap_buffers();
+        glfwPollEvents();
+    }
+    return {};
+}
+
+}  // namespace
+
+int run_view(int argc, char** argv) {
+    CLI::App app{"Opens a window on a terrain. The commands shot, fly and audit work without one: scree-view COMMAND --help.", "scree-view"};
+    ViewOptions o;
+    o.size = "1280x800";
+    double seconds = 0;
+    add_view_options(app, o);
+    app.add_option("--seconds", seconds, "Close after so long; 0: stay open")->capture_default_str();
+    app.set_version_flag("--version", std::string("scree-view ") + SCREE_VERSION);
+    if (const int code = parse_arguments(app, argc, argv); code >= 0) return code;
+    if (auto ok = check_view_options(o); !ok) return report_error("scree-view", ok.error());
+    install_interrupt_handler();
+    if (auto ok = view(o, seconds); !ok) return report_error("scree-view", ok.error());
+    return 0;
+}
+
+}  // namespace scree

@@ -1,0 +1,66 @@
+#include "runtime/app/view_options.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "common/report.h"
+
+namespace scree {
+
+void add_view_options(CLI::App& app, ViewOptions& o) {
+    app.add_option("STORE", o.store, "A .scree file")->required();
+    app.add_option("--size", o.size, "Picture in pixels, WIDTHxHEIGHT")->capture_default_str();
+    app.add_option("--fov", o.fov_deg, "Vertical field of view, degrees")->capture_default_str();
+    app.add_option("--tau", o.tau_px, "Allowed screen-space error, pixels: smaller is truer and costs triangles")->capture_default_str();
+    app.add_option("--texture-tau", o.texture_tau_px, "Screen pixels a texel may cover: smaller is sharper and costs memory")
+        ->capture_default_str();
+    app.add_option("--budget", o.budget, "Ceiling of tile memory, such as 256M")->capture_default_str();
+    app.add_option("--json", o.json, "Write the report as JSON to a file, or - for standard output");
+}
+
+Result<void> check_view_options(ViewOptions& o) {
+    const auto size = parse_size(o.size);
+    if (!size || size->first > 16384 || size->second > 16384)
+        return Error{ErrorCode::usage, fmt::format("--size {} is not WIDTHxHEIGHT within 16384", o.size)};
+    o.width_px = size->first;
+    o.height_px = size->second;
+    const auto budget = parse_bytes(o.budget);
+    if (!budget) return Error{ErrorCode::usage, fmt::format("--budget {} is not a size such as 256M", o.budget)};
+    o.budget_bytes = *budget;
+    if (!(std::isfinite(o.tau_px) && o.tau_px >= 0)) return Error{ErrorCode::usage, fmt::format("--tau {} is not a length in pixels", o.tau_px)};
+    if (!(std::isfinite(o.texture_tau_px) && o.texture_tau_px > 0))
+        return Error{ErrorCode::usage, fmt::format("--texture-tau {} is not above 0", o.texture_tau_px)};
+    if (!(o.fov_deg >= 0.001 && o.fov_deg <= 179)) return Error{ErrorCode::usage, fmt::format("--fov {} is outside 0.001..179 degrees", o.fov_deg)};
+    return {};
+}
+
+SceneOptions scene_options(const ViewOptions& o) {
+    SceneOptions s;
+    s.budget_bytes = o.budget_bytes;
+    s.tau_px = o.tau_px;
+    s.texture_tau_px = o.texture_tau_px;
+    return s;
+}
+
+Result<Camera> camera_of(const FlightPose& pose, const ViewOptions& o) {
+    return look_at(pose.eye, pose.look, o.fov_deg, o.width_px, o.height_px);
+}
+
+Result<FlightPath> flight_of(const TileStore& store, const ViewOptions& o, int frames) {
+    if (!o.path) return default_flight(store, frames);
+    auto path = read_flight_path(*o.path);
+    if (!path) return path;
+    return resample(*path, frames);
+}
+
+int parse_arguments(CLI::App& app, int argc, char** argv) {
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+        return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorCode::usage);
+    }
+    return -1;
+}
+
+}  // namespace scree

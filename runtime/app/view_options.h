@@ -1,0 +1,40 @@
+// Options that scree-view's commands share, and how they are checked.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "runtime/app/scene.h"
+#include "runtime/view/camera.h"
+#include "runtime/view/flight_path.h"
+
+namespace scree {
+
+struct ViewOptions {
+    std::string store;
+    std::string size = "800x800";
+    double fov_deg = 40;
+    double tau_px = 1;
+    double texture_tau_px = 1;
+    std::string budget = "256M";
+    std::optional<std::string> path;
+    std::string json;
+
+    int width_px = 800, height_px = 800;
+    std::int64_t budget_bytes = 0;
+};
+
+void add_view_options(CLI::App& app, ViewOptions& options);
+/// Parses sizes; checks ranges. Errors: ErrorCode::usage.
+Result<void> check_view_options(ViewOptions& options);
+/// The scene as the options want it.
+SceneOptions scene_options(const ViewOptions& options);
+Result<Camera> camera_of(const FlightPose& pose, const ViewOptions& options);
+/// --path, or the default flight, with `frames` poses.
+Result<FlightPath> flight_of(const TileStore& store, const ViewOptions& options, int frames);
+/// Parses argv; -1 to go on, else the exit code.
+int parse_arguments(CLI::App& app, int argc, char** argv);
+
+}  // namespace scree

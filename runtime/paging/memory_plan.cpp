@@ -1,0 +1,52 @@
+#include "runtime/paging/memory_plan.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "common/height_tile.h"
+#include "common/mesh/vertex_slot.h"
+#include "common/texture_tile.h"
+
+namespace scree {
+namespace {
+
+constexpr std::int64_t kStagingSlots = 24;     // of each kind: about two frames of a fast disk
+constexpr std::int64_t kBookkeepingBytes = 160;  // hash map entry, list links, ids
+constexpr double kHeightShare = 0.3;           // 14.6 KB against 43.7 KB: a page for each texture and a quarter more
+
+}  // namespace
+
+std::int64_t height_slot_cost(const Dataset& d) {
+    return static_cast<std::int64_t>(slot_bytes(d.lattice.tile_cells_log2)) +
+           static_cast<std::int64_t>(sizeof(HeightTileHeader)) + kBookkeepingBytes;
+}
+std::int64_t texture_slot_cost(const Dataset& d) {
+    return static_cast<std::int64_t>(bc1_chain_bytes(d.texture_size_log2)) + kBookkeepingBytes;
+}
+
+Result<MemoryPlan> plan_memory(const Dataset& d, std::int64_t budget_bytes) {
+    const std::int64_t height = height_slot_cost(d), texture = texture_slot_cost(d);
+    const std::int64_t roots = d.lattice.root_rows * d.lattice.root_columns;
+    MemoryPlan plan;
+    plan.staging_slots = std::clamp<std::int64_t>(budget_bytes / 16 / (height + texture), 2, kStagingSlots);
+    const std::int64_t staging = plan.staging_slots * (height + texture);
+    const std::int64_t pinned = roots * (height + texture);
+    // Besides the roots a split needs four tiles of each kind.
+    const std::int64_t needed = std::max(8 * pinned, staging + pinned + 4 * (height + texture));
+    if (budget_bytes < needed)
+        return Error{ErrorCode::usage, fmt::format("--budget {:.1f} MB is too small for this store: {:.1f} MB are needed ({} pinned "
+                                                   "root{} may take an eighth)",
+                                                   static_cast<double>(budget_bytes) / 1e6, static_cast<double>(needed) / 1e6, roots,
+                                                   roots == 1 ? "" : "s")};
+    const std::int64_t free = budget_bytes - staging;
+    plan.height_slots = std::min(std::max(static_cast<std::int64_t>(kHeightShare * static_cast<double>(free)) / height,
+                                          roots + 4), d.height_tiles);
+    plan.texture_slots = std::clamp<std::int64_t>((free - plan.height_slots * height) / texture, 1, d.texture_tiles);
+    // What a small texture pyramid leaves over goes to heights.
+    plan.height_slots = std::min((free - plan.texture_slots * texture) / height, d.height_tiles);
+    plan.resident_bytes = staging + plan.height_slots * height + plan.texture_slots * texture;
+    return plan;
+}
+
+}  // namespace scree

@@ -1,0 +1,35 @@
+// The GLSL programs of this room, built from the embedded shaders. OpenGL thread only. Errors (ErrorCode::display)
+// carry the compiler's log; a shader that does not compile on a driver is a defect here or there, never the user's.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/result.h"
+#include "runtime/render/gl_handle.h"
+
+namespace scree {
+
+struct TerrainVariant {
+    bool with_haze = false;
+    bool colour_by_level = false;
+};
+
+Result<ProgramHandle> build_terrain_program(int tile_cells_log2, TerrainVariant variant);
+Result<ProgramHandle> build_sky_program();
+
+/// The strings that make the terrain's vertex shader, in order.
+std::vector<std::string> terrain_vertex_sources(int tile_cells_log2);
+
+struct ProgramSources {
+    std::string name;                           ///< for messages
+    std::vector<std::string> vertex;            ///< strings joined in order; the version line is added
+    std::vector<std::string> fragment;          ///< may be empty: no fragment shader
+    std::vector<const char*> captured_outputs;  ///< interleaved transform feedback; usually empty
+};
+
+Result<ProgramHandle> build_program(const ProgramSources& sources);
+
+}  // namespace scree

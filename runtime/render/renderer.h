@@ -1,0 +1,89 @@
+// Renderer: draws a list of tiles and the sky as a camera sees them. Owns the arenas; slots are numbers that others
+// deal out. OpenGL thread only: created, used and destroyed there, under one current context. A steady frame allocates
+// nothing.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include <glm/glm.hpp>
+
+#include "common/lattice.h"
+#include "common/mesh/vertex_slot.h"
+#include "common/result.h"
+#include "runtime/lod/draw_list.h"
+#include "runtime/render/render_target.h"
+#include "runtime/view/camera.h"
+
+namespace scree {
+
+struct RendererOptions {
+    Lattice lattice;  ///< checked
+    double height_offset_m = 0;
+    double height_quantum_m = 1;
+    int texture_size_log2 = 8;
+    /// Slots are the memory: renderer_bytes() says how much. Fewer: coarser pictures under the same budget rule; all of
+    /// it is taken at once.
+    int height_slots = 1;
+    int texture_slots = 1;
+    /// Draws a frame at most. 52 bytes each, three times.
+    int max_draws = 4096;
+    /// 1: off; up to 16: sharper imagery at grazing angles; costs 5 to 6 ms at 800x800 on software OpenGL.
+    double anisotropy = 1;
+};
+
+/// Bytes the arenas will take of a memory budget.
+std::size_t renderer_bytes(const RendererOptions& options);
+
+struct FrameSettings {
+    /// Towards the sun, unit length. Lights the sky only: imagery brings its own light.
+    glm::vec3 sun_direction{-0.574f, -0.574f, 0.584f};
+    /// Level distance at which haze takes 63 % of what is behind it, for an eye on the ground plane. Smaller: more
+    /// depth to the picture, less to see. 0: none (the sky below the horizon keeps some).
+    double haze_distance_m = 0;
+    /// Height over the ground plane at which haze is 1/e as thick. Larger: views from above pale as well.
+    double haze_scale_height_m = 2500;
+    /// Height (z) of the plane that stands in for the world beyond the data.
+    double ground_height_m = 0;
+    /// For finding faults.
+    bool wireframe = false;
+    bool colour_by_level = false;
+    bool magenta_background = false;  ///< pure (255, 0, 255) in place of the sky: what shows it was not drawn on
+    /// Wait for the end of drawing and fill FrameTimes::finished_ms. Stops CPU and GPU from overlapping.
+    bool wait_until_drawn = false;
+};
+
+struct FrameTimes {
+    std::uint32_t draws = 0;
+    std::uint32_t multi_draws = 0;
+    std::uint64_t triangles = 0;
+    double submitted_ms = 0;  ///< wall time of draw() without waiting
+    double finished_ms = 0;   ///< wall time with waiting; 0 without wait_until_drawn
+};
+
+class Renderer {
+public:
+    /// Needs a current GlContext. Errors (ErrorCode::display): no memory for the arenas, a shader does not compile.
+    static Result<std::unique_ptr<Renderer>> create(const RendererOptions& options);
+    ~Renderer();
+    Renderer(const Renderer&) = delete;
+    Renderer& operator=(const Renderer&) = delete;
+
+    /// See VertexArena::upload and TextureArena::upload; slots and sizes that do not fit assert.
+    void upload_height(int slot, std::span<const SlotVertex> vertices);
+    void upload_texture(int slot, std::span<const std::uint8_t> chain);
+
+    /// Clears `target`, draws `items` (slots uploaded before; at most max_draws) and the sky. The camera's size is the
+    /// target's.
+    FrameTimes draw(const Camera& camera, std::span<const DrawItem> items, const FrameSettings& settings,
+                    RenderTarget& target);
+
+private:
+    struct State;
+    explicit Renderer(std::unique_ptr<State> state);
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace scree

@@ -1,0 +1,54 @@
+// The colour of sky and haze, one definition for both, so that the far ground fades into exactly the sky behind it. All
+// colours are linear; the framebuffer encodes them as sRGB.
+layout(location = kSunUniform) uniform vec3 sun_direction;
+
+// Haze thins exponentially with height over the ground plane that stands in for the world beyond the data:
+// x extinction at that plane, 1/m (0: no haze); y 1/m, inverse of the scale height; z eye above the plane, m, at least 1;
+// w density at the eye, exp(-z * y).
+layout(location = kHazeUniform) uniform vec4 haze;
+
+const vec3 kZenith = vec3(0.055, 0.170, 0.480);
+const vec3 kHorizon = vec3(0.560, 0.680, 0.800);
+const vec3 kGround = vec3(0.215, 0.230, 0.215);
+const vec3 kSunlight = vec3(1.000, 0.860, 0.640);
+
+// Plain multiplications stand in for pow() and exp(): on software OpenGL the sky costs what it computes.
+float fourth_power(float x) {
+    float square = x * x;
+    return square * square;
+}
+
+// The horizon's colour in a direction that lies at cosine `towards` (>= 0) of the sun: brighter and warmer near it.
+vec3 horizon_colour(float towards) {
+    float wide = fourth_power(towards);
+    return kHorizon + kSunlight * (0.22 * wide * wide);
+}
+
+float towards_sun(vec3 direction) { return max(dot(direction, sun_direction), 0.0); }
+
+// Mean density of the haze over a ray that ends `rise_m` above the eye.
+float mean_haze_density(float rise_m) {
+    float rise = rise_m * haze.y;
+    float density_there = exp(-max((haze.z + rise_m) * haze.y, 0.0));
+    // The quotient cancels for level rays; there its first two terms err by rise^2 / 6 < 2e-5.
+    return abs(rise) < 1e-2 ? haze.w * (1.0 - 0.5 * rise) : (haze.w - density_there) / rise;
+}
+
+// Share of light lost over a ray (Beer-Lambert).
+float haze_share(float mean_density, float distance_m) { return 1.0 - exp(-mean_density * distance_m * haze.x); }
+
+vec3 sky_colour(vec3 direction) {
+    float towards = towards_sun(direction);
+    vec3 horizon = horizon_colour(towards);
+    // Below the horizon the ray meets the ground plane; mean density times distance is (1 - haze.w) / (haze.y * -z).
+    if (direction.z < 0.0) {
+        float depth = (1.0 - haze.w) * haze.x / (haze.y * max(-direction.z, 1e-6));
+        return mix(kGround, horizon, 1.0 - exp(-depth));
+    }
+    float near_sun = fourth_power(fourth_power(towards));         // ^16
+    float glow = fourth_power(near_sun) * near_sun * near_sun;    // ^96: a few degrees
+    float core = fourth_power(glow) * fourth_power(glow);         // ^768; its square: a degree or two
+    float disc = clamp((towards - 0.99985) * 10000.0, 0.0, 1.0);  // half a degree across
+    vec3 sky = mix(kZenith, horizon, fourth_power(1.0 - direction.z));
+    return sky + kSunlight * (0.35 * glow + 0.6 * core * core + 4.0 * disc);
+}

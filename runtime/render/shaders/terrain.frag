@@ -1,0 +1,29 @@
+// Imagery, then haze. kWithHaze and kColourByLevel are set when the program is built.
+layout(binding = kImageryTextureUnit) uniform sampler2DArray imagery;
+
+in vec3 relative_m;
+in float haze_density;
+in vec2 texture_position;
+flat in float texture_layer;
+flat in int tile_step;
+
+out vec4 fragment_colour;
+
+vec3 level_colour() {
+    float level = float(findMSB(tile_step));
+    return 0.5 + 0.5 * cos(2.4 * level + vec3(0.0, 2.1, 4.2));
+}
+
+void main() {
+    vec4 texel = texture(imagery, vec3(texture_position, texture_layer));
+    // Alpha 0 means "no heights here". Such texels decode to black, so filtering premultiplies: divide by what is there.
+    if (texel.a < 0.5) discard;
+    vec3 colour = texel.rgb / texel.a;
+    if (kColourByLevel) colour = mix(colour, level_colour(), 0.6);
+    if (kWithHaze) {
+        float distance_m = length(relative_m);
+        vec3 horizon = horizon_colour(towards_sun(relative_m / distance_m));
+        colour = mix(colour, horizon, haze_share(haze_density, distance_m));
+    }
+    fragment_colour = vec4(colour, 1.0);
+}

@@ -1,0 +1,35 @@
+// Flight paths: where the camera is and looks, frame by frame.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <glm/glm.hpp>
+
+#include "common/store/tile_store.h"
+
+namespace scree {
+
+struct FlightPose {
+    glm::dvec3 eye{0};
+    glm::dvec3 look{0};
+};
+
+using FlightPath = std::vector<FlightPose>;
+
+/// The default flight over a dataset of extent W (its longer side): the first third low (0.4 % of W, at least 3 cells, above
+/// the ground) along a weaving diagonal, the second high (10 % of W) looking 15 degrees down across the middle, the last
+/// steep (4 % of W) looking 60 degrees down. `frames` poses. Deterministic.
+/// Errors: those of the store.
+Result<FlightPath> default_flight(const TileStore& store, int frames);
+
+/// Reads `eye_x,eye_y,eye_z,look_x,look_y,look_z` with that header. Errors: ErrorCode::input naming file and line.
+Result<FlightPath> read_flight_path(const std::string& csv);
+
+/// `frames` poses evenly spaced in index along a path, linearly interpolated; the path itself when frames <= 0.
+FlightPath resample(const FlightPath& path, int frames);
+
+/// Looks at the whole dataset from the south-east of its middle, 30 degrees down.
+FlightPose overview(const Dataset& dataset, double fov_deg, double aspect);
+
+}  // namespace scree

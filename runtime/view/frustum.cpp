@@ -1,0 +1,35 @@
+#include "runtime/view/frustum.h"
+
+#include <algorithm>
+
+namespace scree {
+
+double distance_to_box(glm::dvec3 point, const Box& box) {
+    const glm::dvec3 nearest = glm::clamp(point, box.low, box.high);
+    return glm::length(point - nearest);
+}
+
+Frustum::Frustum(const Camera& camera) : eye_(camera.eye), forward_(camera.forward), near_m_(camera.near_m) {
+    const glm::dvec3 right = camera.right(), up = camera.up;
+    const double tx = camera.tan_half_x(), ty = camera.tan_half_y();
+    normals_ = {forward_ * tx + right, forward_ * tx - right, forward_ * ty + up, forward_ * ty - up};
+}
+
+bool Frustum::may_see(const Box& box) const {
+    const glm::dvec3 low = box.low - eye_, high = box.high - eye_;
+    const auto furthest = [&](glm::dvec3 n) {
+        return (n.x > 0 ? high.x : low.x) * n.x + (n.y > 0 ? high.y : low.y) * n.y + (n.z > 0 ? high.z : low.z) * n.z;
+    };
+    if (!(furthest(forward_) >= near_m_)) return false;
+    for (const glm::dvec3& n : normals_)
+        if (!(furthest(n) >= 0)) return false;
+    return true;
+}
+
+bool Frustum::contains(glm::dvec3 point) const {
+    const glm::dvec3 p = point - eye_;
+    if (!(glm::dot(p, forward_) >= near_m_)) return false;
+    return std::all_of(normals_.begin(), normals_.end(), [&](glm::dvec3 n) { return glm::dot(p, n) >= 0; });
+}
+
+}  // namespace scree

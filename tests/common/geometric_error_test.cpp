@@ -1,0 +1,184 @@
+#include "common/mesh/geometric_error.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "common/mesh/drawn_surface.h"
+#include "tests/common/test_support.h"
+
+namespace scree {
+namespace {
+
+using Samples = std::vector<std::int32_t>;
+
+std::size_t at(int n, int i, int j) { return static_cast<std::size_t>(j * ((1 << n) + 1) + i); }
+
+// Whether vertex (i, j) belongs to a present cell.
+bool is_present(const std::vector<std::uint8_t>& cells, int n, int i, int j) {
+    if (cells.empty()) return true;
+    const int m = 1 << n;
+    for (int y = std::max(j - 1, 0); y <= std::min(j, m - 1); ++y)
+        for (int x = std::max(i - 1, 0); x <= std::min(i, m - 1); ++x)
+            if (cells[static_cast<std::size_t>(y * m + x)] != 0) return true;
+    return false;
+}
+
+// Greatest |z - drawn| over all 16 masks, where finest vertex (i, j) stands at (origin + (i, j)) / unit of the drawn
+// tile.
+double brute_error(const Samples& drawn, int n, int geomip, std::int64_t origin_i, std::int64_t origin_j,
+                   std::int64_t unit, const Samples& finest, const std::vector<std::uint8_t>& cells) {
+    double worst = 0;
+    for (unsigned mask = 0; mask < kEdgeMaskCount; ++mask)
+        for (int j = 0; j <= 1 << n; ++j)
+            for (int i = 0; i <= 1 << n; ++i) {
+                if (!is_present(cells, n, i, j)) continue;
+                const ExactHeight h = drawn_height(drawn, n, {geomip, mask}, origin_i + i, origin_j + j, unit);
+                const std::int64_t d = std::abs(finest[at(n, i, j)] * h.denominator - h.numerator);
+                worst = std::max(worst, static_cast<double>(d) / static_cast<double>(h.denominator));
+            }
+    return worst;
+}
+
+BlockVertices coarsest_block_of(const Samples& samples, int n) {
+    BlockVertices block{};
+    const int half = 1 << (n - 1);
+    for (int k = 0; k < 9; ++k) block[static_cast<std::size_t>(k)] = samples[at(n, k % 3 * half, k / 3 * half)];
+    return block;
+}
+
+FinestVertices finest_of(const Samples& samples, const std::vector<std::uint8_t>& present, int n) {
+    return {samples.data(), present.empty() ? nullptr : present.data(), n};
+}
+
+TEST(LeafErrors, EqualTheBruteForceOverAllMasks) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    for (int n = 2; n <= 4; ++n)
+        for (int k = 0; k < 12; ++k) {
+            const Samples samples = test::random_samples(random, n, k % 2 == 0 ? 500 : kMaxHeightUnits);
+            const auto cells =
+                k % 3 == 0 ? std::vector<std::uint8_t>{} : test::random_presence(random, n, k % 3 == 1 ? 60 : 8);
+            const auto vertices = present_vertices(cells, n);
+            const auto errors = leaf_errors(finest_of(samples, vertices, n));
+            double running = 0;
+            for (int g = 0; g < n; ++g) {
+                running = std::max(running, brute_error(samples, n, g, 0, 0, 1, samples, cells));
+                ASSERT_EQ(errors[static_cast<std::size_t>(g)], running)
+                    << "n " << n << " case " << k << " geomip " << g;
+            }
+        }
+}
+
+TEST(CoarseBlockError, EqualsTheBruteForceAtEveryPlaceInAnAncestor) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    for (int n = 2; n <= 4; ++n)
+        for (int up = 1; up <= 3; ++up) {
+            const Samples ancestor = test::random_samples(random, n, 3000);
+            const int m = 1 << n, leaves = 1 << up;
+            const std::int64_t stride = std::int64_t{1} << (up + n - 1);
+            for (int place = 0; place < leaves * leaves; ++place) {
+                const Samples leaf = test::random_samples(random, n, 3000);
+                const auto cells = place % 2 == 0 ? std::vector<std::uint8_t>{} : test::random_presence(random, n, 20);
+                const auto vertices = present_vertices(cells, n);
+                const std::int64_t i = place % leaves * m, j = place / leaves * m;
+                ASSERT_EQ(
+                    coarse_block_error(coarsest_block_of(ancestor, n), stride, i, j, finest_of(leaf, vertices, n)),
+                    brute_error(ancestor, n, n - 1, i, j, std::int64_t{1} << up, leaf, cells))
+                    << "n " << n << " up " << up << " place " << place;
+            }
+        }
+}
+
+TEST(GeometricError, ARampHasNone) {
+    const int n = 4, m = 16;
+    Samples samples(17 * 17);
+    for (int j = 0; j <= m; ++j)
+        for (int i = 0; i <= m; ++i) samples[at(n, i, j)] = 700 * i - 311 * j + 5;
+    for (const double error : leaf_errors(finest_of(samples, {}, n))) EXPECT_EQ(error, 0);
+    BlockVertices block{};  // the same plane two levels up, the leaf in its south-east
+    for (int k = 0; k < 9; ++k)
+        block[static_cast<std::size_t>(k)] = 700 * (k % 3 * 32 - 48) - 311 * (k / 3 * 32 - 48) + 5;
+    EXPECT_EQ(coarse_block_error(block, 32, 48, 48, finest_of(samples, {}, n)), 0);
+}
+
+TEST(GeometricError, ASpikeCountsInFullAtEveryLevelThatDropsIt) {
+    const int n = 4;
+    constexpr std::int32_t kHeight = 12345;
+    Samples samples(17 * 17, 0);
+    samples[at(n, 5, 7)] = kHeight;
+    const auto errors = leaf_errors(finest_of(samples, {}, n));
+    EXPECT_EQ(errors[0], 0);
+    for (std::size_t g = 1; g < 4; ++g) EXPECT_EQ(errors[g], kHeight);
+    for (int up = 1; up < 20; ++up)
+        EXPECT_EQ(coarse_block_error({}, std::int64_t{1} << (up + n - 1), 0, 0, finest_of(samples, {}, n)), kHeight);
+}
+
+TEST(GeometricError, ASpikeOnTheBorderCountsAtOnceBecauseThinningRemovesIt) {
+    Samples samples(17 * 17, 0);
+    samples[at(4, 5, 0)] = 99;
+    EXPECT_EQ(leaf_errors(finest_of(samples, {}, 4))[0], 99);
+}
+
+TEST(GeometricError, AbsentCellsDoNotCount) {
+    const int n = 2;
+    Samples samples(25, 0);
+    samples[at(n, 1, 1)] = 1000;
+    std::vector<std::uint8_t> cells(16, 0);
+    cells[15] = 1;
+    const auto vertices = present_vertices(cells, n);
+    for (const double error : leaf_errors(finest_of(samples, vertices, n))) EXPECT_EQ(error, 0);
+    cells[0] = 1;
+    EXPECT_EQ(leaf_errors(finest_of(samples, present_vertices(cells, n), n))[1], 1000);
+}
+
+TEST(GeometricError, AlternatingExtremesAreExact) {
+    constexpr double kWorst = 2.0 * kMaxHeightUnits;
+    for (int n = 2; n <= 5; ++n) {
+        Samples samples(at(n, 1 << n, 1 << n) + 1);
+        for (int j = 0; j <= 1 << n; ++j)
+            for (int i = 0; i <= 1 << n; ++i)
+                samples[at(n, i, j)] = (i + j) % 2 == 0 ? kMaxHeightUnits : -kMaxHeightUnits;
+        const auto errors = leaf_errors(finest_of(samples, {}, n));
+        for (int g = 0; g < n; ++g) EXPECT_EQ(errors[static_cast<std::size_t>(g)], kWorst);
+        BlockVertices high{};
+        high.fill(kMaxHeightUnits);
+        for (int log2 = n; log2 <= 28; ++log2)
+            EXPECT_EQ(coarse_block_error(high, std::int64_t{1} << log2, 0, 0, finest_of(samples, {}, n)), kWorst);
+    }
+}
+
+TEST(PresentVertices, AreTheCornersOfPresentCells) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    for (int n = 1; n <= 4; ++n) {
+        const auto cells = test::random_presence(random, n, 15);
+        const auto vertices = present_vertices(cells, n);
+        for (int j = 0; j <= 1 << n; ++j)
+            for (int i = 0; i <= 1 << n; ++i) EXPECT_EQ(vertices[at(n, i, j)] != 0, is_present(cells, n, i, j));
+    }
+    EXPECT_TRUE(present_vertices({}, 3).empty());
+}
+
+TEST(RoundUpToFloat, IsTheSmallestFloatNotBelow) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    for (int k = 0; k < 100000; ++k) {
+        const double value = std::ldexp(static_cast<double>(random() >> 11), test::uniform(random, -80, 0));
+        const float rounded = round_up_to_float(value);
+        ASSERT_GE(static_cast<double>(rounded), value);
+        if (rounded > 0) {
+            ASSERT_LT(static_cast<double>(std::nextafter(rounded, -1.0f)), value);
+        }
+    }
+    EXPECT_EQ(round_up_to_float(0), 0.0f);
+    EXPECT_EQ(round_up_to_float(16777217.0), 16777218.0f);
+    EXPECT_EQ(round_up_to_float(16777216.0), 16777216.0f);
+    EXPECT_GT(round_up_to_float(1e-300), 0.0f);
+}
+
+}  // namespace
+}  // namespace scree

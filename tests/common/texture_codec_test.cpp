@@ -1,0 +1,110 @@
+#include "common/store/texture_codec.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/common/test_support.h"
+
+namespace scree {
+namespace {
+
+constexpr TextureCodec kCodecs[] = {TextureCodec::raw, TextureCodec::split};
+
+TextureTile random_tile(test::Random& random, int size_log2, bool noisy) {
+    TextureTile tile;
+    tile.child_mask = static_cast<std::uint8_t>(test::uniform(random, 0, 15));
+    tile.blocks.resize(bc1_chain_bytes(size_log2));
+    for (auto& byte : tile.blocks) byte = noisy ? static_cast<std::uint8_t>(random()) : std::uint8_t{0};
+    return tile;
+}
+
+TEST(TextureTile, OffsetsOfMipsTileTheChainCoarsestFirst) {
+    for (int log2 = kMinTextureSizeLog2; log2 <= kMaxTextureSizeLog2; ++log2) {
+        EXPECT_EQ(bc1_mip_offset(log2, log2), 0u);
+        for (int mip = log2; mip > 0; --mip)
+            EXPECT_EQ(bc1_mip_offset(log2, mip) + bc1_mip_bytes(log2, mip), bc1_mip_offset(log2, mip - 1));
+        EXPECT_EQ(bc1_mip_offset(log2, 0) + bc1_mip_bytes(log2, 0), bc1_chain_bytes(log2));
+    }
+    for (int log2 = 3; log2 <= kMaxTextureSizeLog2; ++log2) {  // the closed form of docs/store-format.md
+        const std::size_t half_square = std::size_t{1} << (2 * log2 - 1);
+        EXPECT_EQ(bc1_mip_offset(log2, 0), 24 + (half_square - 32) / 3);
+    }
+    EXPECT_EQ(bc1_chain_bytes(8), 43704u);  // 32768 + 8192 + 2048 + 512 + 128 + 32 + 3 * 8
+}
+
+TEST(TextureCodec, RandomTilesComeBackExactly) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    for (int k = 0; k < 60; ++k) {
+        const int log2 = test::uniform(random, kMinTextureSizeLog2, 8);
+        const TextureTile tile = random_tile(random, log2, k % 3 != 0);
+        for (const TextureCodec codec : kCodecs) {
+            const auto back =
+                decode_texture_tile(encode_texture_tile(tile, log2, codec), log2, static_cast<int>(codec));
+            ASSERT_TRUE(back.ok()) << back.error().message;
+            ASSERT_EQ(*back, tile);
+        }
+    }
+}
+
+TEST(TextureCodec, EveryTruncatedPrefixIsRefused) {
+    test::Random random(1);
+    const TextureTile tile = random_tile(random, 4, true);
+    for (const TextureCodec codec : kCodecs) {
+        const auto bytes = encode_texture_tile(tile, 4, codec);
+        for (std::size_t size = 0; size < bytes.size(); ++size) {
+            const auto result = decode_texture_tile(std::span(bytes).first(size), 4, static_cast<int>(codec));
+            ASSERT_FALSE(result.ok()) << size;
+            EXPECT_EQ(result.error().code, ErrorCode::store);
+        }
+    }
+}
+
+TEST(TextureCodec, ExtraBytesAreRefused) {
+    test::Random random(1);
+    const TextureTile tile = random_tile(random, 4, true);
+    for (const TextureCodec codec : kCodecs) {
+        auto bytes = encode_texture_tile(tile, 4, codec);
+        const auto second = bytes;
+        bytes.push_back(0);
+        EXPECT_FALSE(decode_texture_tile(bytes, 4, static_cast<int>(codec)).ok());
+        bytes.pop_back();
+        bytes.insert(bytes.end(), second.begin() + 1, second.end());
+        EXPECT_FALSE(decode_texture_tile(bytes, 4, static_cast<int>(codec)).ok());
+    }
+}
+
+TEST(TextureCodec, BadChildBitsUnknownCodecsAndOtherSizesAreRefused) {
+    test::Random random(1);
+    const TextureTile tile = random_tile(random, 4, true);
+    for (const TextureCodec codec : kCodecs) {
+        auto bytes = encode_texture_tile(tile, 4, codec);
+        for (const int other : {-1, 2, 255}) EXPECT_FALSE(decode_texture_tile(bytes, 4, other).ok());
+        for (int log2 = 5; log2 <= kMaxTextureSizeLog2; ++log2)
+            EXPECT_FALSE(decode_texture_tile(bytes, log2, static_cast<int>(codec)).ok());
+        for (const int mask : {16, 128, 255}) {
+            bytes[0] = static_cast<std::uint8_t>(mask);
+            EXPECT_FALSE(decode_texture_tile(bytes, 4, static_cast<int>(codec)).ok());
+        }
+    }
+}
+
+TEST(TextureCodec, RandomBitFlipsNeverCrash) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    const TextureTile tile = random_tile(random, 4, false);
+    for (int k = 0; k < 20000; ++k) {
+        const TextureCodec codec = kCodecs[k % 2];
+        auto bytes = encode_texture_tile(tile, 4, codec);
+        for (int flips = test::uniform(random, 1, 4); flips > 0; --flips) {
+            const int bit = test::uniform(random, 0, static_cast<int>(bytes.size()) * 8 - 1);
+            bytes[static_cast<std::size_t>(bit / 8)] ^= static_cast<std::uint8_t>(1 << bit % 8);
+        }
+        const auto back = decode_texture_tile(bytes, 4, static_cast<int>(codec));
+        if (back) {
+            ASSERT_EQ(back->blocks.size(), bc1_chain_bytes(4));
+        }
+    }
+}
+
+}  // namespace
+}  // namespace scree

@@ -1,0 +1,359 @@
+// One thing damaged at a time, and verify says which.
+#include <gtest/gtest.h>
+#include <sqlite3.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "common/store/height_codec.h"
+#include "common/store/sqlite_store.h"
+#include "tests/common/test_support.h"
+#include "tests/tools/verify/small_store.h"
+#include "tools/verify/verify.h"
+
+namespace scree {
+namespace {
+
+using test::SmallStore;
+
+constexpr test::SmallTerrain kTerrain{
+    .cells_x = 30, .cells_y = 16, .texture_deepest_level = 2, .present_percent = 80, .seed = 5};
+
+VerifyReport verify_after(const std::function<void(SmallStore&)>& damage, const std::string& sql = {},
+                          const test::SmallTerrain& terrain = kTerrain) {
+    const test::TemporaryFolder folder;
+    const std::string path = folder.file("store.scree");
+    SmallStore store = test::make_small_store(terrain);
+    if (damage) damage(store);
+    store.write(path);
+    if (!sql.empty()) {
+        sqlite3* db = nullptr;
+        EXPECT_EQ(sqlite3_open(path.c_str(), &db), SQLITE_OK);
+        EXPECT_EQ(sqlite3_exec(db, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK) << sqlite3_errmsg(db);
+        sqlite3_close(db);
+    }
+    const auto report = verify_store(path);
+    EXPECT_TRUE(report.ok()) << report.error().message;
+    return report.ok() ? *report : VerifyReport{};
+}
+
+testing::AssertionResult names(const VerifyReport& report, const std::string& text) {
+    std::string all;
+    for (const auto& problem : report.problems) {
+        if (problem.find(text) != std::string::npos) return testing::AssertionSuccess();
+        all += "\n" + problem;
+    }
+    return testing::AssertionFailure() << "no problem says '" << text << "' among:" << all;
+}
+
+TEST(VerifyDamage, AnUndamagedStoreHasNone) { EXPECT_TRUE(verify_after({}).sound()); }
+
+TEST(VerifyDamage, AnOddSampleOnTheEdgeOfANeighbour) {
+    const VerifyReport report = verify_after([](SmallStore& s) {
+        s.heights.at({2, 1, 1}).samples[1 * 5 + 4] += 1;  // east edge, row 1: no coarser tile has it
+        s.recompute_ranges();
+    });
+    EXPECT_EQ(report.shared_samples_differing, 1);
+    EXPECT_TRUE(names(report, "height tile 2/1/1: 1 of 5 samples differ from those of its neighbour 2/2/1"));
+}
+
+TEST(VerifyDamage, ASampleInsideThatTheParentAlsoHas) {
+    const VerifyReport report = verify_after([](SmallStore& s) {
+        s.heights.at({2, 1, 1}).samples[2 * 5 + 2] += 1;
+        s.recompute_ranges();
+    });
+    EXPECT_EQ(report.shared_samples_differing, 1);
+    EXPECT_TRUE(names(report, "height tile 2/1/1: 1 samples differ from its parent's"));
+}
+
+TEST(VerifyDamage, ASampleOnTheEdgeBetweenTwoRoots) {
+    const VerifyReport report = verify_after([](SmallStore& s) {
+        s.heights.at({0, 1, 0}).samples[2 * 5 + 0] += 1;
+        s.recompute_ranges();
+    });
+    EXPECT_EQ(report.shared_samples_differing, 3);  // the other root and two children
+}
+
+TEST(VerifyDamage, EveryBoundOneFloatBelowItsTruth) {
+    const SmallStore sound = test::make_small_store(kTerrain);
+    int lowered = 0;
+    for (const auto& [id, tile] : sound.heights)
+        for (std::size_t g = 0; g < 2; ++g) {
+            const auto own = tile.header.own.error_n;
+            const float below = std::nextafter(own[g], -1.0f);
+            if (below < 0 || (g == 1 && below < own[0])) continue;  // the codec refuses errors that fall
+            const TileId place = id;
+            const VerifyReport report = verify_after([&](SmallStore& s) {
+                s.heights.at(place).header.own.error_n[g] = below;
+                s.copy_bounds_to_parents();
+            });
+            // Saturation may hold a level above its own truth; the deepest and coarsest of each tile is the truth
+            // itself here.
+            const bool saturated_only = id.level < sound.dataset.lattice.deepest_level && g == 1 && own[1] == own[0];
+            EXPECT_TRUE(report.bound_violations >= 1 || saturated_only)
+                << id.level << "/" << id.x << "/" << id.y << " geomip " << g;
+            EXPECT_EQ(report.shared_samples_differing, 0);
+            ++lowered;
+        }
+    EXPECT_GT(lowered, 50);
+}
+
+TEST(VerifyDamage, ABoundAboveTheTruthIsAllowedWhenParentsKnowIt) {
+    const VerifyReport report = verify_after([](SmallStore& s) {
+        for (auto& [id, tile] : s.heights)
+            for (std::size_t g = 0; g < 2; ++g) tile.header.own.error_n[g] += 100;
+        s.copy_bounds_to_parents();
+    });
+    EXPECT_TRUE(report.sound());
+}
+
+TEST(VerifyDamage, AParentsBoundBelowItsChildsAtTheSameStride) {
+    const VerifyReport report = verify_after([](SmallStore& s) {
+        s.heights.at({2, 0, 0}).header.own.error_n[1] += 1e6f;
+        s.copy_bounds_to_parents();
+    });
+    EXPECT_EQ(report.bound_violations, 1);
+    EXPECT_TRUE(names(report, "height tile 1/0/0: error"));
+}
+
+TEST(VerifyDamage, AParentThatHoldsOtherBoundsThanItsChild) {
+    EXPECT_TRUE(names(verify_after([](SmallStore& s) {
+                          s.heights.at({1, 0, 0}).header.children[3].error_n[0] = 0;
+                      }),
+                      "height tile 2/1/1: its bounds differ"));
+    EXPECT_TRUE(names(verify_after([](SmallStore& s) {
+                          s.heights.at({0, 0, 0}).header.children[0].max_n += 1;
+                      }),
+                      "height tile 1/0/0: its bounds differ"));
+}
+
+TEST(VerifyDamage, ARangeThatIsTooNarrowOrTooWide) {
+    for (const int change : {-1, 1})
+        for (const TileId id : {TileId{0, 0, 0}, TileId{1, 1, 0}, TileId{2, 2, 2}}) {
+            const VerifyReport report = verify_after([&](SmallStore& s) {
+                s.heights.at(id).header.own.max_n += change;
+                s.copy_bounds_to_parents();
+            });
+            EXPECT_TRUE(names(report, "height tile " + std::to_string(id.level) + "/" + std::to_string(id.x) + "/" +
+                                          std::to_string(id.y) + ": height range"));
+        }
+}
+
+TEST(VerifyDamage, AChildBitWithoutItsRowAndARowWithoutItsBit) {
+    const VerifyReport missing = verify_after([](SmallStore& s) {
+        s.heights.erase({2, 1, 1});
+        s.dataset.height_tiles -= 1;
+    });
+    EXPECT_TRUE(names(missing, "height tile 2/1/1 is missing"));
+    const VerifyReport orphan = verify_after([](SmallStore& s) {
+        HeightTileHeader& header = s.heights.at({1, 0, 0}).header;
+        header.child_mask = static_cast<std::uint8_t>(header.child_mask & ~8u);
+        header.children[3] = {};
+    });
+    EXPECT_TRUE(names(orphan, "height tile 2/1/1 is an orphan: its parent does not know it"));
+}
+
+TEST(VerifyDamage, AMissingInnerTileLeavesOrphans) {
+    const VerifyReport report = verify_after([](SmallStore& s) { s.heights.erase({1, 1, 1}); });
+    EXPECT_TRUE(names(report, "height tile 1/1/1 is missing"));
+    EXPECT_TRUE(names(report, "height tile 2/2/2 is an orphan: its parent is not stored"));
+    EXPECT_TRUE(names(report, "dataset: "));
+}
+
+TEST(VerifyDamage, AMissingRoot) {
+    EXPECT_TRUE(names(verify_after([](SmallStore& s) {
+                          s.heights.erase({0, 1, 0});
+                      }),
+                      "texture tile 0/1/0 has no height tile"));
+}
+
+TEST(VerifyDamage, PresenceBits) {
+    // A cell taken away: its texels should be transparent, the count is wrong.
+    const VerifyReport away = verify_after([](SmallStore& s) {
+        auto tile = std::find_if(s.heights.begin(), s.heights.end(), [](const auto& t) { return t.first.level == 2; });
+        if (tile->second.presence.empty()) tile->second.presence.assign(16, 1);
+        *std::find(tile->second.presence.begin(), tile->second.presence.end(), 1) = 0;
+    });
+    EXPECT_TRUE(names(away, "texels are transparent where there are heights"));
+    EXPECT_TRUE(names(away, "dataset: "));
+    // A cell outside the data, east of column 30.
+    const VerifyReport outside = verify_after([](SmallStore& s) {
+        for (auto& [id, tile] : s.heights)
+            if (id.level == 2 && id.x == 7 && !tile.presence.empty()) tile.presence[3] = 1;
+    });
+    EXPECT_TRUE(names(outside, "cells outside the data's extent are present"));
+    const VerifyReport none = verify_after([](SmallStore& s) { s.heights.at({2, 1, 1}).presence.assign(16, 0); });
+    EXPECT_TRUE(names(none, "height tile 2/1/1 is stored without a present cell"));
+    const VerifyReport inner = verify_after([](SmallStore& s) { s.heights.at({1, 0, 0}).presence.assign(16, 1); });
+    EXPECT_TRUE(names(inner, "height tile 1/0/0 holds presence bits"));
+}
+
+TEST(VerifyDamage, EveryTransparentTexelOfEveryMip) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    for (int k = 0; k < 60; ++k) {
+        std::string tile_name;
+        const VerifyReport report = verify_after([&](SmallStore& s) {
+            auto tile =
+                std::next(s.textures.begin(), test::uniform(random, 0, static_cast<int>(s.textures.size()) - 1));
+            tile_name = "texture tile " + std::to_string(tile->first.level) + "/" + std::to_string(tile->first.x) +
+                        "/" + std::to_string(tile->first.y);
+            auto& blocks = tile->second.blocks;
+            const int block = test::uniform(random, 0, static_cast<int>(blocks.size()) / 8 - 1);
+            const int texel = test::uniform(random, 0, 15);
+            std::uint8_t& selectors = blocks[static_cast<std::size_t>(8 * block + 4 + texel / 4)];
+            selectors = static_cast<std::uint8_t>(selectors ^ 3 << (2 * (texel % 4)));  // 0 and 3 change places
+        });
+        ASSERT_TRUE(names(report, tile_name + ": 1 texels are transparent"));
+        EXPECT_EQ(report.problems.size(), 1u);
+    }
+}
+
+TEST(VerifyDamage, FourColourBlocksCannotHoldTransparency) {
+    const VerifyReport report = verify_after([](SmallStore& s) {
+        for (auto& [id, tile] : s.textures)
+            for (std::size_t b = 0; b < tile.blocks.size(); b += 8)
+                if (tile.blocks[b + 4] == 0xFF) {
+                    std::swap(tile.blocks[b], tile.blocks[b + 2]);
+                    std::swap(tile.blocks[b + 1], tile.blocks[b + 3]);
+                    return;
+                }
+    });
+    EXPECT_TRUE(names(report, "texels are transparent where there are heights or opaque"));
+}
+
+TEST(VerifyDamage, TextureRows) {
+    EXPECT_TRUE(names(verify_after([](SmallStore& s) {
+                          s.textures.erase({2, 1, 1});
+                      }),
+                      "texture tile 2/1/1 is missing"));
+    EXPECT_TRUE(names(verify_after([](SmallStore& s) {
+                          s.textures.at({1, 0, 0}).child_mask ^= 1;
+                      }),
+                      "texture tile 1/0/0: child bits"));
+    EXPECT_TRUE(names(verify_after([](SmallStore& s) {
+                          s.textures.at({2, 0, 0}).child_mask = 1;
+                      }),
+                      "texture tile 2/0/0: child bits 0001 should be 0000"));
+    EXPECT_TRUE(names(verify_after([](SmallStore& s) {
+                          s.textures[{3, 0, 0}] = s.textures.begin()->second;
+                      }),
+                      "texture tile 3/0/0 lies below the deepest level 2"));
+}
+
+TEST(VerifyDamage, TextureRowsBelowTheHeights) {
+    test::SmallTerrain deep = kTerrain;
+    deep.texture_deepest_level = 4;
+    EXPECT_TRUE(verify_after({}, {}, deep).sound());
+    EXPECT_TRUE(names(verify_after(
+                          [](SmallStore& s) {
+                              s.textures.erase({4, 3, 3});
+                          },
+                          {}, deep),
+                      "texture tile 4/3/3 is missing"));
+    EXPECT_TRUE(names(verify_after(
+                          [](SmallStore& s) {
+                              s.textures.erase({3, 1, 1});
+                          },
+                          {}, deep),
+                      "texture tile 4/2/2 is an orphan: its parent is not stored"));
+    const VerifyReport extra = verify_after(
+        [](SmallStore& s) {
+            const TextureTile some = s.textures.at({4, 3, 3});
+            for (std::int64_t k = 0; k < 32 * 16; ++k) s.textures.insert({{4, k % 32, k / 32}, some});
+        },
+        {}, deep);
+    EXPECT_TRUE(names(extra, "is an orphan: its parent does not know it"));
+}
+
+TEST(VerifyDamage, DatasetCountsAndRanges) {
+    EXPECT_TRUE(
+        names(verify_after([](SmallStore& s) { s.dataset.height_tiles += 1; }), "height tiles, the table holds"));
+    EXPECT_TRUE(
+        names(verify_after([](SmallStore& s) { s.dataset.texture_tiles += 1; }), "texture tiles, the table holds"));
+    EXPECT_TRUE(
+        names(verify_after([](SmallStore& s) { s.dataset.present_cells += 1; }), "present cells, the tiles hold"));
+    EXPECT_TRUE(names(verify_after([](SmallStore& s) { s.dataset.max_height_m = 1e6; }), "dataset: heights"));
+}
+
+TEST(VerifyDamage, RowsThatSqliteStillReads) {
+    EXPECT_TRUE(names(verify_after({}, "UPDATE height SET payload = zeroblob(length(payload)) WHERE key = 9"),
+                      "checksum does not match"));
+    EXPECT_TRUE(names(verify_after({}, "UPDATE texture SET codec = 9 WHERE key = 9"), "checksum does not match"));
+    EXPECT_TRUE(
+        names(verify_after({}, "UPDATE height SET payload = CAST(payload AS TEXT) WHERE key = 9"), "other types"));
+    EXPECT_TRUE(names(verify_after({}, "INSERT INTO height VALUES(-4, 0, 0, x'00')"), "-4 is no key of this lattice"));
+    EXPECT_TRUE(names(verify_after({}, "DELETE FROM height WHERE key >= 0"), "no root is stored"));
+}
+
+TEST(VerifyDamage, TheSchema) {
+    EXPECT_TRUE(names(verify_after({}, "CREATE TABLE more(x)"), "unexpected table 'more'"));
+    EXPECT_TRUE(names(verify_after({}, "CREATE TRIGGER t AFTER INSERT ON height BEGIN SELECT 1; END"),
+                      "unexpected trigger 't'"));
+    EXPECT_TRUE(names(verify_after({}, "ALTER TABLE height ADD COLUMN more"), "other columns"));
+    EXPECT_TRUE(
+        names(verify_after({}, "DROP TABLE texture; CREATE VIEW texture AS SELECT * FROM height"), "unexpected view"));
+    EXPECT_TRUE(names(verify_after({}, "INSERT INTO dataset SELECT 2, codec, checksum, payload FROM dataset"),
+                      "table 'dataset' has 2 rows"));
+    EXPECT_TRUE(names(verify_after({}, "CREATE TABLE more(x)"), "is damaged")) << "written without page checksums";
+}
+
+TEST(VerifyDamage, ThousandsOfProblemsAreCountedNotListed) {
+    test::SmallTerrain large = kTerrain;
+    large.cells_x = 120;
+    large.cells_y = 64;
+    const VerifyReport report = verify_after(
+        [](SmallStore& s) {
+            for (auto& [id, tile] : s.heights) tile.header.own.max_n = kMaxHeightUnits;
+            s.copy_bounds_to_parents();
+        },
+        {}, large);
+    ASSERT_EQ(report.problems.size(), 101u);
+    EXPECT_NE(report.problems.back().find("more problems"), std::string::npos);
+}
+
+TEST(VerifyDamage, AnyFlippedBitIsAProblemOrAnErrorNeverACrash) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    const test::TemporaryFolder folder;
+    const std::string path = folder.file("store.scree");
+    test::make_small_store({.cells_x = 8, .cells_y = 8, .texture_deepest_level = 2}).write(path);
+    const auto bytes = test::read_bytes(path);
+    for (int k = 0; k < 1500; ++k) {
+        auto copy = bytes;
+        const std::size_t bit = k < 800 ? static_cast<std::size_t>(k) : random() % (bytes.size() * 8);
+        copy[bit / 8] ^= static_cast<std::uint8_t>(1u << bit % 8);
+        test::write_bytes(path, copy);
+        const auto report = verify_store(path);
+        ASSERT_TRUE(!report.ok() || !report->problems.empty()) << "bit " << bit;
+    }
+}
+
+TEST(VerifyDamage, RandomBytesOverAPageAreAProblemOrAnErrorNeverACrash) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    const test::TemporaryFolder folder;
+    const std::string path = folder.file("store.scree");
+    test::make_small_store({.cells_x = 16, .cells_y = 16}).write(path);
+    const auto bytes = test::read_bytes(path);
+    for (int k = 0; k < 400; ++k) {
+        auto copy = bytes;
+        const std::size_t from = k % 2 == 0 ? random() % copy.size() : random() % (copy.size() / 16384) * 16384;
+        const std::size_t to = std::min(copy.size(), from + random() % 200 + 1);
+        for (std::size_t b = from; b < to; ++b) copy[b] = static_cast<std::uint8_t>(random());
+        test::write_bytes(path, copy);
+        const auto report = verify_store(path);
+        ASSERT_TRUE(!report.ok() || !report->problems.empty() || copy == bytes) << from << " to " << to;
+    }
+    for (int k = 0; k < 100; ++k) {
+        auto copy = bytes;
+        copy.resize(random() % bytes.size());
+        test::write_bytes(path, copy);
+        const auto report = verify_store(path);
+        ASSERT_TRUE(!report.ok() || !report->problems.empty()) << "cut to " << copy.size();
+    }
+}
+
+}  // namespace
+}  // namespace scree

@@ -1,0 +1,117 @@
+// What verify says of sound stores: nothing.
+#include "tools/verify/verify.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/common/test_support.h"
+#include "tests/tools/verify/small_store.h"
+
+namespace scree {
+namespace {
+
+std::string joined(const std::vector<std::string>& lines) {
+    std::string text;
+    for (const auto& line : lines) text += line + "\n";
+    return text;
+}
+
+VerifyReport verify(const test::SmallStore& store) {
+    const test::TemporaryFolder folder;
+    store.write(folder.file("store.scree"));
+    const auto report = verify_store(folder.file("store.scree"));
+    EXPECT_TRUE(report.ok()) << report.error().message;
+    return report.ok() ? *report : VerifyReport{};
+}
+
+void expect_sound(const test::SmallTerrain& terrain) {
+    const test::SmallStore store = test::make_small_store(terrain);
+    const VerifyReport report = verify(store);
+    EXPECT_TRUE(report.sound()) << joined(report.problems);
+    EXPECT_EQ(report.tiles_checked, static_cast<std::int64_t>(store.heights.size() + store.textures.size()));
+    EXPECT_GT(report.bounds_checked, 0);
+}
+
+TEST(VerifySound, OneTile) { expect_sound({.cells_x = 4, .cells_y = 4, .texture_deepest_level = 0}); }
+
+TEST(VerifySound, CountsOfASquareOfFourLeaves) {
+    const VerifyReport report =
+        verify(test::make_small_store({.cells_x = 8, .cells_y = 8, .texture_deepest_level = 1}));
+    EXPECT_TRUE(report.sound()) << joined(report.problems);
+    EXPECT_EQ(report.tiles_checked, 10);
+    EXPECT_EQ(report.shared_samples_compared, 4 * 5 + 4 * 9);  // four inner edges, four quadrants of the root
+    EXPECT_EQ(report.bounds_checked, 4 * 2 + 4 * 1 + 1);       // leaves; root against each leaf; root's coarsest
+}
+
+TEST(VerifySound, SeveralRootsAndDataThatEndInsideATile) {
+    expect_sound({.cells_x = 45, .cells_y = 13});
+    expect_sound({.cells_x = 5, .cells_y = 37});
+}
+
+TEST(VerifySound, HolesOfEverySize) {
+    for (std::uint64_t seed = 1; seed <= 12; ++seed)
+        for (const int percent : {15, 50, 85}) {
+            SCOPED_TRACE("seed " + std::to_string(seed) + ", " + std::to_string(percent) + " %");
+            expect_sound({.cells_x = 29, .cells_y = 22, .present_percent = percent, .seed = seed});
+        }
+}
+
+TEST(VerifySound, EveryDepthOfTexture) {
+    for (int level = 0; level <= 5; ++level) {
+        SCOPED_TRACE("texture level " + std::to_string(level));
+        expect_sound({.cells_x = 14, .cells_y = 15, .texture_deepest_level = level, .present_percent = 60});
+    }
+}
+
+TEST(VerifySound, TexelsFromAnEighthOfACellToBeyondATile) {
+    for (const int n : {2, 3, 5})
+        for (const int log2 : {4, 5})
+            for (int level = 0; level <= 2; ++level) {
+                SCOPED_TRACE("n " + std::to_string(n) + ", texture 2^" + std::to_string(log2) + ", level " +
+                             std::to_string(level));
+                expect_sound({.cells_x = 60,
+                              .cells_y = 64,
+                              .tile_cells_log2 = n,
+                              .texture_size_log2 = log2,
+                              .texture_deepest_level = level,
+                              .present_percent = 50,
+                              .seed = 9});
+            }
+    expect_sound({.cells_x = 120, .cells_y = 40, .texture_deepest_level = 0, .present_percent = 50});
+}
+
+TEST(VerifySound, HeightsAtTheirExtremes) {
+    expect_sound({.cells_x = 32, .cells_y = 32, .amplitude = kMaxHeightUnits, .present_percent = 70});
+}
+
+TEST(Verify, ProgressRisesFromZeroToOne) {
+    const test::TemporaryFolder folder;
+    test::make_small_store({}).write(folder.file("store.scree"));
+    double last = 0;
+    VerifyOptions options;
+    options.progress = [&](double fraction) {
+        EXPECT_GE(fraction, last);
+        EXPECT_LE(fraction, 1.0);
+        last = fraction;
+    };
+    ASSERT_TRUE(verify_store(folder.file("store.scree"), options).ok());
+    EXPECT_EQ(last, 1.0);
+}
+
+TEST(Verify, StopsWhenAsked) {
+    const test::TemporaryFolder folder;
+    test::make_small_store({}).write(folder.file("store.scree"));
+    std::atomic<bool> stop = true;
+    VerifyOptions options;
+    options.stop = &stop;
+    const auto report = verify_store(folder.file("store.scree"), options);
+    ASSERT_FALSE(report.ok());
+    EXPECT_EQ(report.error().code, ErrorCode::interrupted);
+}
+
+TEST(Verify, AMissingStoreIsAnInputError) {
+    const test::TemporaryFolder folder;
+    EXPECT_EQ(verify_store(folder.file("missing.scree")).error().code, ErrorCode::input);
+}
+
+}  // namespace
+}  // namespace scree

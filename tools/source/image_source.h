@@ -1,0 +1,59 @@
+// One opened raster file, read in bands of rows. Pixels come from OpenImageIO (plain TIFFs: from
+// libtiff itself, see tiff_decoder.cpp), georeference from GeoTIFF keys (libgeotiff)
+// or a world file. Memory held is one band of the file's own storage unit (a strip group, or one row of tiles).
+// Not thread-safe: one reader thread per object.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "common/result.h"
+#include "tools/source/georeference.h"
+
+namespace scree {
+
+enum class SampleType { u8, i8, u16, i16, u32, i32, u64, i64, f16, f32, f64 };
+
+bool is_integer(SampleType type);
+/// True where every value of the type is exact in float32 (8 and 16 bit integers, half, float).
+bool fits_float32(SampleType type);
+
+struct ImageInfo {
+    std::int64_t width = 0;   ///< samples a row
+    std::int64_t height = 0;  ///< rows
+    int channels = 0;
+    int alpha_channel = -1;  ///< index, or -1
+    SampleType type = SampleType::u8;
+    bool tiled = false;
+    std::optional<double> nodata;       ///< GDAL_NODATA tag, already cast to the pixel type
+    std::int64_t unit_bytes = 0;        ///< decoded bytes of the largest unit that must be held at once
+};
+
+struct OpenOptions {
+    std::int64_t max_unit_bytes = INT64_MAX;  ///< a strip, row of tiles or frame above this is refused, naming the size needed
+};
+
+class ImageSource {
+public:
+    /// Opens and checks the header; pixels are not touched. Errors: ErrorCode::input, naming file, value, consequence.
+    static Result<std::unique_ptr<ImageSource>> open(const std::string& path, const OpenOptions& options = {});
+    virtual ~ImageSource() = default;
+
+    virtual const ImageInfo& info() const = 0;
+    /// Absent when the file carries none. A file whose georeference cannot be used (rotated, non-square...) still opens:
+    /// the facts are in Georeference and the caller decides.
+    virtual const std::optional<Georeference>& georeference() const = 0;
+
+    /// Rows [row_begin, row_end), channel 0, row-major into out ((row_end-row_begin)*width values). No nodata handling.
+    /// Reading forward is cheap; going back may decode again.
+    virtual Result<void> read_channel(std::int64_t row_begin, std::int64_t row_end, std::span<float> out) = 0;
+    virtual Result<void> read_channel(std::int64_t row_begin, std::int64_t row_end, std::span<double> out) = 0;
+    /// Rows as 8-bit RGBA (grey is replicated; no alpha channel means 255; 16-bit and float are scaled to 0..255 by the
+    /// type's range, float 0..1). Colour channels stay unassociated.
+    virtual Result<void> read_rgba8(std::int64_t row_begin, std::int64_t row_end, std::span<std::uint8_t> out) = 0;
+};
+
+}  // namespace scree

@@ -1,0 +1,41 @@
+// What turns rows of one open file into samples in memory: OpenImageIO for most, libtiff itself for plain TIFFs.
+// One thread at a time.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "common/result.h"
+#include "tools/source/image_header.h"
+#include "tools/source/image_source.h"
+
+namespace scree {
+
+struct DecodedLayout {
+    std::int64_t width = 0;
+    std::int64_t height = 0;
+    int channels = 0;
+    int alpha_channel = -1;
+    SampleType type = SampleType::u8;  ///< f16 is handed out widened to float
+    std::int64_t tile_rows = 0;        ///< 0: strips or lines
+};
+
+/// Bytes of a sample in memory.
+std::size_t memory_bytes(SampleType type);
+
+class PixelDecoder {
+public:
+    virtual ~PixelDecoder() = default;
+    virtual const DecodedLayout& layout() const = 0;
+    /// Rows [begin, end), all channels interleaved, into out; begin is the first row of a strip or row of tiles.
+    /// An Error holds the bare reason; the caller adds file and rows.
+    virtual Result<void> decode(std::int64_t begin, std::int64_t end, std::byte* out) = 0;
+};
+
+/// Both return Errors (ErrorCode::input) with whole messages. make_tiff_decoder needs header.plain_tiff.
+Result<std::unique_ptr<PixelDecoder>> make_tiff_decoder(const std::string& path, const ImageHeader& header);
+Result<std::unique_ptr<PixelDecoder>> make_openimageio_decoder(const std::string& path, const ImageHeader& header);
+
+}  // namespace scree

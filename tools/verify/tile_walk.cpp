@@ -1,0 +1,275 @@
+#include "tools/verify/tile_walk.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace scree {
+namespace {
+
+std::string name(const char* kind, TileId id) { return fmt::format("{} tile {}/{}/{}", kind, id.level, id.x, id.y); }
+
+}  // namespace
+
+TileWalk::TileWalk(const Dataset& dataset, TileReader& reader, VerifyReport& report, ProblemList& problems,
+                   std::function<bool()> tick)
+    : dataset_(dataset),
+      lattice_(dataset.lattice),
+      reader_(reader),
+      report_(report),
+      problems_(problems),
+      tick_(std::move(tick)),
+      heights_(reader, dataset),
+      grid_(dataset) {}
+
+Result<void> TileWalk::run() {
+    visit_roots();
+    if (!failure_) finish_dataset();
+    if (failure_) return *failure_;
+    return {};
+}
+
+void TileWalk::visit_roots() {
+    bool any = false;
+    for (std::int64_t y = 0; y < lattice_.root_rows; ++y) {
+        for (std::int64_t x = 0; x < lattice_.root_columns && !failure_; ++x) {
+            const TileId root{0, x, y};
+            auto tile = heights_.get(root);  // a root without data is not stored
+            if (tile && !*tile) continue;
+            any = true;
+            if (!visit(root)) all_read_ = false;
+        }
+    }
+    if (!any) problems_.add("no root is stored");
+}
+
+// False: something under `id` could not be read, so that what depends on all of it cannot be judged.
+bool TileWalk::visit(TileId id) {
+    if (failure_) return false;
+    auto tile = heights_.get(id);
+    if (!tile) {
+        ++height_rows_;
+        take_error("height", id, tile.error());
+        return false;
+    }
+    if (!*tile) {
+        problems_.add(name("height", id) + " is missing: its parent says that it is stored");
+        return false;
+    }
+    ++height_rows_;
+    ++report_.tiles_checked;
+    tick_row();
+
+    const int n = lattice_.tile_cells_log2;
+    const Frame* parent = frames_.empty() ? nullptr : frames_.back().get();
+    frames_.push_back(std::make_unique<Frame>());
+    Frame& frame = *frames_.back();
+    frame.id = id;
+    frame.tile = *tile;
+    frame.block = coarsest_block(frame.tile->samples, n);
+    frame.stride = lattice_.tile_extent(id.level) / 2;
+    if (id.level <= dataset_.texture_deepest_level) frame.alpha = AlphaRaster(dataset_.texture_size());
+
+    check_header(frame);
+    check_range(frame);
+    if (parent != nullptr) compare_with_parent(frame, *parent);
+    compare_with_neighbours(frame);
+    if (id.level == lattice_.deepest_level) {
+        visit_leaf(frame);
+    } else {
+        for (int q = 0; q < 4 && !failure_; ++q)
+            if ((frame.tile->header.child_mask >> q & 1) != 0 && !visit(child_of(id, q))) frame.complete = false;
+        frame.texture_children = frame.tile->header.child_mask;
+        check_coarsest_bound(frame);
+    }
+    if (id.level <= dataset_.texture_deepest_level && !failure_) check_texture(frame);
+
+    const bool complete = frame.complete && !failure_;
+    if (frames_.size() > 1 && complete && id.level <= dataset_.texture_deepest_level)
+        halve_into_quadrant(frame.alpha, quadrant_of(id), frames_[frames_.size() - 2]->alpha);
+    if (id.level == 0) {
+        lowest_n_ = std::min(lowest_n_, frame.tile->header.own.min_n);
+        highest_n_ = std::max(highest_n_, frame.tile->header.own.max_n);
+    }
+    frames_.pop_back();
+    return complete;
+}
+
+void TileWalk::check_header(const Frame& frame) {
+    const bool leaf = frame.id.level == lattice_.deepest_level;
+    if (leaf && frame.tile->header.child_mask != 0)
+        problems_.add(name("height", frame.id) + " is of the deepest level and says that it has children");
+    if (!leaf && frame.tile->header.child_mask == 0)
+        problems_.add(name("height", frame.id) + " has no child: a tile without a present cell is not stored");
+    if (!leaf && !frame.tile->presence.empty())
+        problems_.add(name("height", frame.id) + " holds presence bits, which belong to the deepest level");
+}
+
+void TileWalk::check_range(const Frame& frame) {
+    const HeightTileHeader& header = frame.tile->header;
+    auto [low, high] = std::minmax_element(frame.tile->samples.begin(), frame.tile->samples.end());
+    std::int32_t min_n = *low, max_n = *high;
+    for (std::size_t q = 0; q < 4; ++q) {
+        if ((header.child_mask >> q & 1) == 0) continue;
+        min_n = std::min(min_n, header.children[q].min_n);
+        max_n = std::max(max_n, header.children[q].max_n);
+    }
+    if (header.own.min_n != min_n || header.own.max_n != max_n)
+        problems_.add(fmt::format("{}: height range {}..{} should be {}..{}", name("height", frame.id),
+                                  header.own.min_n, header.own.max_n, min_n, max_n));
+}
+
+void TileWalk::compare_with_parent(const Frame& frame, const Frame& parent) {
+    const int n = lattice_.tile_cells_log2, m = 1 << n, pitch = m + 1;
+    const auto quadrant = static_cast<std::size_t>(quadrant_of(frame.id));
+    const HeightBounds& known = parent.tile->header.children[quadrant];
+    const HeightBounds& own = frame.tile->header.own;
+    if (!(known == own))
+        problems_.add(name("height", frame.id) + ": its bounds differ from those that its parent holds for it");
+
+    const int left = (quadrant & 1) != 0 ? m / 2 : 0, top = (quadrant & 2) != 0 ? m / 2 : 0;
+    std::int64_t differing = 0;
+    for (int j = 0; j <= m / 2; ++j)
+        for (int i = 0; i <= m / 2; ++i)
+            differing += frame.tile->samples[static_cast<std::size_t>(2 * j * pitch + 2 * i)] !=
+                                 parent.tile->samples[static_cast<std::size_t>((top + j) * pitch + left + i)]
+                             ? 1
+                             : 0;
+    report_.shared_samples_compared += std::int64_t{m / 2 + 1} * (m / 2 + 1);
+    report_.shared_samples_differing += differing;
+    if (differing != 0)
+        problems_.add(fmt::format("{}: {} samples differ from its parent's", name("height", frame.id), differing));
+
+    // Where both can draw a stride, the parent's surface is the child's: the child's bound covers it.
+    for (int g = 0; g + 1 < n; ++g) {
+        ++report_.bounds_checked;
+        const float upper = parent.tile->header.own.error_n[static_cast<std::size_t>(g)];
+        const float lower = own.error_n[static_cast<std::size_t>(g) + 1];
+        if (upper >= lower) continue;
+        ++report_.bound_violations;
+        problems_.add(
+            fmt::format("{}: error {} at geomip level {} is below {} of its child {}/{}/{} at the same stride",
+                        name("height", parent.id), upper, g, lower, frame.id.level, frame.id.x, frame.id.y));
+    }
+}
+
+void TileWalk::compare_with_neighbours(const Frame& frame) {
+    const int m = lattice_.tile_cells();
+    const TileId id = frame.id;
+    compare_border(frame, {id.level, id.x + 1, id.y}, m, 0, 0, 1, m + 1, -m, 0);
+    compare_border(frame, {id.level, id.x, id.y + 1}, 0, m, 1, 0, m + 1, 0, -m);
+    if (id.level > 0) return;  // below, tiles that only touch share an ancestor's sample, and are compared with it
+    compare_border(frame, {0, id.x + 1, id.y + 1}, m, m, 0, 0, 1, -m, -m);
+    compare_border(frame, {0, id.x - 1, id.y + 1}, 0, m, 0, 0, 1, m, -m);
+}
+
+// `count` samples of the frame's tile from (from_i, from_j) on, against the neighbour's, whose indices differ by
+// `across`.
+void TileWalk::compare_border(const Frame& frame, TileId neighbour, int from_i, int from_j, int step_i, int step_j,
+                              int count, int across_i, int across_j) {
+    if (!lattice_.contains(neighbour)) return;
+    auto other = heights_.get(neighbour);
+    if (!other) {
+        if (other.error().code != ErrorCode::store) failure_ = other.error();
+        return;  // a damaged neighbour is named when the walk comes to it
+    }
+    if (!*other) return;
+    const int pitch = lattice_.tile_samples();
+    std::int64_t differing = 0;
+    for (int k = 0; k < count; ++k) {
+        const int i = from_i + k * step_i, j = from_j + k * step_j;
+        if (frame.tile->samples[static_cast<std::size_t>(j * pitch + i)] !=
+            (*other)->samples[static_cast<std::size_t>((j + across_j) * pitch + i + across_i)])
+            ++differing;
+    }
+    report_.shared_samples_compared += count;
+    report_.shared_samples_differing += differing;
+    if (differing != 0)
+        problems_.add(fmt::format("{}: {} of {} samples differ from those of its neighbour {}/{}/{}",
+                                  name("height", frame.id), differing, count, neighbour.level, neighbour.x,
+                                  neighbour.y));
+}
+
+void TileWalk::visit_leaf(Frame& frame) {
+    const HeightTile& tile = *frame.tile;
+    const int n = lattice_.tile_cells_log2;
+    const std::int64_t m = lattice_.tile_cells();
+    const LatticePoint corner = lattice_.corner(frame.id);
+    const CellPresence presence{corner.i, corner.j, m, tile.presence};
+
+    std::int64_t present = 0, outside = 0;
+    for (std::int64_t j = corner.j; j < corner.j + m; ++j) {
+        for (std::int64_t i = corner.i; i < corner.i + m; ++i) {
+            if (!presence.at(i, j)) continue;
+            ++present;
+            if (i >= lattice_.cells_x || j >= lattice_.cells_y) ++outside;
+        }
+    }
+    present_cells_ += present;
+    if (present == 0) problems_.add(name("height", frame.id) + " is stored without a present cell");
+    if (outside != 0)
+        problems_.add(
+            fmt::format("{}: {} cells outside the data's extent are present", name("height", frame.id), outside));
+
+    const FinestTile finest = make_finest_tile(tile.samples, tile.presence, n);
+    const std::vector<ExactError> own = own_errors(finest);
+    for (int g = 0; g < n; ++g)
+        count_bound(frame.id, g, own[static_cast<std::size_t>(g)],
+                    tile.header.own.error_n[static_cast<std::size_t>(g)]);
+    for (std::size_t above = 0; above + 1 < frames_.size(); ++above) {
+        Frame& ancestor = *frames_[above];
+        const LatticePoint from = lattice_.corner(ancestor.id);
+        ancestor.worst = std::max(ancestor.worst, ancestor_error(ancestor.block, ancestor.stride, corner.i - from.i,
+                                                                 corner.j - from.j, finest));
+    }
+
+    const int texture_level = dataset_.texture_deepest_level;
+    if (texture_level <= frame.id.level) {
+        Frame& target = *frames_[static_cast<std::size_t>(texture_level)];
+        mark_present(grid_, target.id.x, target.id.y, presence, target.alpha);
+    } else {
+        frame.texture_children = visit_texture_children(frame.id, presence, frame.alpha, frame.complete);
+    }
+}
+
+void TileWalk::check_coarsest_bound(const Frame& frame) {
+    // Over what could be read: a bound below that is wrong whatever the rest holds.
+    const int g = lattice_.tile_cells_log2 - 1;
+    count_bound(frame.id, g, {frame.worst, frame.stride}, frame.tile->header.own.error_n[static_cast<std::size_t>(g)]);
+}
+
+void TileWalk::count_bound(TileId id, int geomip, const ExactError& truth, float stored) {
+    ++report_.bounds_checked;
+    if (truth.within(stored)) return;
+    ++report_.bound_violations;
+    problems_.add(fmt::format("{}: error {} at geomip level {} is below the true {}", name("height", id), stored,
+                              geomip, truth.quanta()));
+}
+
+void TileWalk::finish_dataset() {
+    if (!all_read_) return;
+    if (present_cells_ != dataset_.present_cells)
+        problems_.add(
+            fmt::format("dataset: {} present cells, the tiles hold {}", dataset_.present_cells, present_cells_));
+    // The dataset speaks of source heights, before they were resampled and rounded.
+    const double low = dataset_.height_m(lowest_n_), high = dataset_.height_m(highest_n_);
+    const double slack =
+        dataset_.height_quantum_error_m + dataset_.warp_error_m + 1e-9 * (1 + std::max(std::abs(low), std::abs(high)));
+    if (dataset_.min_height_m < low - slack || dataset_.max_height_m > high + slack)
+        problems_.add(fmt::format("dataset: heights {}..{} m pass the tiles' range {}..{} m", dataset_.min_height_m,
+                                  dataset_.max_height_m, low, high));
+}
+
+void TileWalk::take_error(const char* kind, TileId id, const Error& error) {
+    if (error.code == ErrorCode::store)
+        problems_.add(name(kind, id) + ": " + error.message);
+    else if (!failure_)
+        failure_ = error;
+}
+
+void TileWalk::tick_row() {
+    if (!tick_() && !failure_) failure_ = Error{ErrorCode::interrupted, "stopped"};
+}
+
+}  // namespace scree
