@@ -9,7 +9,7 @@ build=$root/build/$preset
 
 "$root/scripts/setup.sh"
 
-if [[ -f $build/build.ninja ]] && grep -qxF "CMAKE_HOME_DIRECTORY:INTERNAL=$root" "$build/CMakeCache.txt"; then
+if [[ -f $build/build.ninja ]] && grep -qsxF "CMAKE_HOME_DIRECTORY:INTERNAL=$root" "$build/CMakeCache.txt"; then
     exit 0
 fi
 cd -- "$root"

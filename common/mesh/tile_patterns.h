@@ -19,6 +19,13 @@ struct PatternRange {
     std::uint32_t count = 0;
 };
 
+/// A square part of a tile: (x, y) of 2^level x 2^level. Level 0 is the whole tile.
+struct TilePart {
+    int level = 0;
+    int x = 0;
+    int y = 0;
+};
+
 /// All patterns of tiles of 2^n cells a side. Vertex (i, j) of a tile has index j * (2^n + 1) + i. Triangles are
 /// counter-clockwise seen from above (x east, y north).
 class TilePatterns {
@@ -28,12 +35,16 @@ public:
     int tile_cells_log2() const { return tile_cells_log2_; }
     int geomip_levels() const { return tile_cells_log2_; }
     /// Pattern of geomip level g (stride 2^g), 0 <= g < geomip_levels(), with the edges in `mask` thinned by 2.
-    PatternRange range(int geomip, unsigned mask) const;
+    PatternRange range(int geomip, unsigned mask) const { return range(geomip, mask, TilePart{}); }
+    /// The indices of a part only: blocks stand in Morton order, so a part is one range. A part holds at least one block:
+    /// part.level <= finest_part_level(geomip).
+    PatternRange range(int geomip, unsigned mask, TilePart part) const;
+    int finest_part_level(int geomip) const { return tile_cells_log2_ - 1 - geomip; }
     const std::vector<std::uint32_t>& indices() const { return indices_; }
 
 private:
     int tile_cells_log2_;
-    std::vector<PatternRange> ranges_;
+    std::vector<std::vector<std::uint32_t>> block_starts_;  ///< by pattern: first index of each block, and the end
     std::vector<std::uint32_t> indices_;
 };
 

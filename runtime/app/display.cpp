@@ -27,7 +27,7 @@ Result<std::unique_ptr<Display>> Display::create(const Scene& scene, const Displ
     options.texture_size_log2 = d.texture_size_log2;
     options.height_slots = static_cast<int>(scene.memory().height_slots);
     options.texture_slots = static_cast<int>(scene.memory().texture_slots);
-    options.max_draws = options.height_slots;
+    options.max_draws = options.height_slots + options.texture_slots;  // a page, or a part for each deep texture
     auto renderer = Renderer::create(options);
     if (!renderer) return renderer.error();
     display->renderer_ = std::move(*renderer);

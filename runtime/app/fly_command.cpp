@@ -62,7 +62,7 @@ Result<FlightLog> fly(Scene& scene, Display& display, const FlightPath& path, co
         } else {
             frame = scene.advance({&*camera, 1});
         }
-        display.draw(*camera, frame.selection->draws[0]);
+        display.draw(*camera, frame.selection->to_render(0));
         if (display.context().window() != nullptr) {
             display.target().blit_to_window(o.width_px, o.height_px);
             display.context().swap_buffers();

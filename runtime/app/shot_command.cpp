@@ -45,7 +45,7 @@ Result<void> shoot(const ViewOptions& o, const std::optional<FlightPose>& asked,
     auto frame = (*scene)->complete({&*camera, 1}, [] { return interrupt_flag().load(); });
     if (!frame) return frame.error();
     const Selection& selection = *frame->selection;
-    (*display)->draw(*camera, selection.draws[0]);
+    (*display)->draw(*camera, selection.to_render(0));
     const auto pixels = (*display)->target().read_pixels();
     if (auto ok = write_png(out, o.width_px, o.height_px, pixels); !ok) return ok;
     if (!mesh_file.empty()) {

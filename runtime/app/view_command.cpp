@@ -108,7 +108,7 @@ Result<void> view(ViewOptions o, double seconds) {
             continue;
         }
         redraw = frame.stand_ins;
-        (*display)->draw(*camera, frame.selection->draws[0]);
+        (*display)->draw(*camera, frame.selection->to_render(0));
         (*display)->target().blit_to_window(o.width_px, o.height_px);
         fps = elapsed > 0 ? 0.9 * fps + 0.1 / elapsed : fps;
         if (show_hud) hud.draw(status_lines(**scene, frame, pose, fps, controls.speed_m_per_s()));

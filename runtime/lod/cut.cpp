@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <limits>
 
 namespace scree {
@@ -86,8 +87,14 @@ double Cut::geometry_need(std::int32_t index) const {
 }
 
 double Cut::texture_need(const CutNode& node) const {
-    if (node.id.level >= std::min(lattice_.deepest_level, dataset_.texture_deepest_level)) return 0;
-    return dataset_.texel_m(node.id.level) / node.texel_per_px / settings_.texture_tau_px;
+    if (node.id.level >= dataset_.texture_deepest_level) return 0;
+    const double need = dataset_.texel_m(node.id.level) / node.texel_per_px / settings_.texture_tau_px;
+    if (node.id.level < lattice_.deepest_level || !(need > 1)) return need;
+    // Textures deeper than the heights are drawn on parts of the page, each of one block of cells at least.
+    int part_level = 0;
+    const int finest = std::min(dataset_.texture_deepest_level - node.id.level, lattice_.tile_cells_log2 - 1);
+    while (part_level < finest && std::ldexp(need, -part_level) > 1) ++part_level;
+    return node.exponent > lattice_.tile_cells_log2 - 1 - part_level ? need : 0;
 }
 
 void Cut::push(std::int32_t index) {
@@ -142,7 +149,7 @@ bool Cut::step(std::int32_t index) {
         if (node.id.level < lattice_.deepest_level) return try_split(index, std::max(geometry, texture));
         return refine_thinned_neighbours(index) && texture <= 1;
     }
-    if (!may_split_now(index)) return try_reduce(index);
+    if (node.id.level == lattice_.deepest_level || !may_split_now(index)) return try_reduce(index);
     return try_split(index, texture);
 }
 

@@ -1,6 +1,7 @@
 #include "runtime/lod/selection.h"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <limits>
@@ -43,8 +44,83 @@ struct Selector::Impl {
         return level;
     }
 
+    bool has_deep_textures() const { return dataset.texture_deepest_level > dataset.lattice.deepest_level; }
+
+    // Metres of texture a pixel covers at the nearest point of a part of a page; infinite when no view sees it.
+    double texel_per_px(const CutNode& node, TilePart part) const {
+        const Lattice& l = dataset.lattice;
+        const double side = std::ldexp(static_cast<double>(l.tile_extent(node.id.level)), -part.level);
+        const LatticePoint corner = l.corner(node.id);
+        const double i = static_cast<double>(corner.i) + part.x * side, j = static_cast<double>(corner.j) + part.y * side;
+        const Box box{{l.x_m(i), l.y_m(j + side), dataset.height_m(node.bounds.min_n)},
+                      {l.x_m(i + side), l.y_m(j), dataset.height_m(node.bounds.max_n)}};
+        double least = kInfinity;
+        for (const LodView& view : views)
+            if (view.frustum.may_see(box)) least = std::min(least, std::max(distance_to_box(view.eye, box), view.near_m) / view.focal_px);
+        return least;
+    }
+
+    // Visits the existing children of a part's texture that deserve to be resident.
+    template <class Visit>
+    void for_each_deep_child(const CutNode& node, TilePart part, double texture_tau_px, const Residency& residency, const Visit& visit) const {
+        const TileId texture{node.id.level + part.level, (node.id.x << part.level) + part.x, (node.id.y << part.level) + part.y};
+        if (texture.level >= dataset.texture_deepest_level || part.level >= dataset.lattice.tile_cells_log2 - 1) return;
+        const std::uint8_t exists = residency.texture_children(texture);
+        for (int q = 0; q < 4; ++q) {
+            if ((exists >> q & 1) == 0) continue;
+            const TilePart child{part.level + 1, 2 * part.x + (q & 1), 2 * part.y + (q >> 1)};
+            const double need = dataset.texel_m(texture.level) / texel_per_px(node, child) / texture_tau_px;
+            visit(child, child_of(texture, q), need);
+        }
+    }
+
+    void wish_deep(const CutNode& node, TilePart part, double texture_tau_px, const Residency& residency) {
+        for_each_deep_child(node, part, texture_tau_px, residency, [&](TilePart child, TileId id, double need) {
+            if (!(need > 1)) return;
+            wishes.try_emplace(id, need);
+            wish_deep(node, child, texture_tau_px, residency);
+        });
+    }
+
+    // Parts of a page, each with the deepest texture it deserves and has. A part whose texture has no child there at all
+    // shows nothing there: no present cell lies under it.
+    void emit_parts(const CutNode& node, DrawItem item, double texture_tau_px, const Residency& residency,
+                    bool only_planned, DrawList& out) const {
+        const TilePart part = item.part;
+        bool any = false;
+        std::array<bool, 4> finer{}, exists{};
+        std::array<TileId, 4> ids{};
+        std::array<TilePart, 4> parts_of{};
+        for_each_deep_child(node, part, texture_tau_px, residency, [&](TilePart child, TileId id, double need) {
+            const auto q = static_cast<std::size_t>(quadrant_of(id));
+            exists[q] = true;
+            ids[q] = id;
+            parts_of[q] = child;
+            finer[q] = need > 1 && residency.texture(id) >= 0 && (!only_planned || planned_textures.contains(id));
+            any = any || finer[q];
+        });
+        if (!any || part.level >= dataset.lattice.tile_cells_log2 - 1 - item.geomip) {
+            out.push_back(item);
+            return;
+        }
+        for (std::size_t q = 0; q < 4; ++q) {
+            if (!exists[q]) continue;
+            DrawItem child = item;
+            child.part = parts_of[q];
+            if (finer[q]) {
+                child.texture_slot = residency.texture(ids[q]);
+                child.texture_scale = static_cast<float>(1 << child.part.level);
+                child.texture_offset_u = static_cast<float>(-child.part.x);
+                child.texture_offset_v = static_cast<float>(-child.part.y);
+                emit_parts(node, child, texture_tau_px, residency, only_planned, out);
+            } else {
+                out.push_back(child);
+            }
+        }
+            }
+
     // Which texture tiles the plan deserves, coarse before fine, cut off where slots end. Ancestors are kept: they stand in.
-    void plan_textures(const SelectionSettings& settings) {
+    void plan_textures(const SelectionSettings& settings, const Residency& residency) {
         wishes.clear();
         for (const CutNode& node : plan.nodes()) {
             if (node.split || !node.visible) continue;
@@ -57,6 +133,8 @@ struct Selector::Impl {
                     it->second = need;
                 }
             }
+            if (has_deep_textures() && node.id.level == dataset.lattice.deepest_level && wanted == node.id.level)
+                wish_deep(node, {}, settings.texture_tau_px, residency);
         }
         sorted.clear();
         for (const auto& [id, need] : wishes) sorted.push_back({id, need});
@@ -116,6 +194,12 @@ struct Selector::Impl {
             for (std::size_t v = 0; v < cameras.size(); ++v) {
                 if (!views[v].frustum.may_see(box)) continue;
                 result.draws[v].push_back(item);
+                if (!result.parts.empty()) {
+                    if (node.id.level == dataset.lattice.deepest_level && item.texture_scale == 1)
+                        emit_parts(node, item, settings.texture_tau_px, residency, only_planned, result.parts[v]);
+                    else
+                        result.parts[v].push_back(item);
+                }
                 result.triangles += pattern_triangles(n, item.geomip, item.edge_mask);
             }
         }
@@ -152,6 +236,8 @@ const Selection& Selector::select(std::span<const Camera> cameras, const Selecti
     Selection& r = s.result;
     r.draws.resize(cameras.size());
     for (DrawList& list : r.draws) list.clear();
+    if (s.has_deep_textures()) r.parts.resize(cameras.size());
+    for (DrawList& list : r.parts) list.clear();
     for (auto* list : {&r.planned_heights, &r.planned_textures, &r.standing_in, &r.standing_in_textures}) list->clear();
     r.requests.clear();
     r.max_bound_px = 0;
@@ -164,7 +250,7 @@ const Selection& Selector::select(std::span<const Camera> cameras, const Selecti
     s.plan.refine(s.views, {settings.tau_px, settings.texture_tau_px, settings.height_slots, false}, residency);
     r.refine_steps = s.plan.steps();
     r.budget_limited = s.plan.page_limited();
-    s.plan_textures(settings);
+    s.plan_textures(settings, residency);
     s.request_missing(residency);
     const bool heights_complete = std::none_of(r.requests.begin(), r.requests.end(), [](const TileRequest& q) { return q.kind == TileKind::height; });
     if (heights_complete) {

@@ -28,7 +28,9 @@ struct SelectionSettings {
 };
 
 struct Selection {
-    std::vector<DrawList> draws;          ///< one list a view
+    std::vector<DrawList> draws;          ///< one list a view, an item a tile
+    /// The same for the renderer, tiles under deep textures in parts. Empty where the store has none: draw `draws`.
+    std::vector<DrawList> parts;
     std::vector<TileRequest> requests;    ///< most urgent first; nothing that could not be kept
     std::vector<TileId> planned_heights;   ///< what full residency would keep, ancestors included: never to be evicted
     std::vector<TileId> planned_textures;
@@ -40,6 +42,8 @@ struct Selection {
     std::int64_t triangles = 0;   ///< over all views
     std::int64_t nodes = 0;       ///< drawn in any view
     std::int64_t refine_steps = 0;
+
+    const DrawList& to_render(std::size_t view) const { return parts.empty() ? draws[view] : parts[view]; }
 };
 
 class Selector {

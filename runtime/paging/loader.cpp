@@ -51,6 +51,7 @@ struct Loader::Impl {
                 tile.error = decoded.error().message;
                 return;
             }
+            tile.header.child_mask = decoded->child_mask;
             tile.blocks = std::move(decoded->blocks);
         }
     }

@@ -50,7 +50,9 @@ Result<void> Pager::load_roots() {
             if (!texture) return texture.error();
             const auto texture_slot = textures_.reserve(id, frame_);
             if (!texture_slot) return Error{ErrorCode::usage, "more roots than texture slots"};
-            textures_.complete(id, nullptr);
+            HeightTileHeader children;
+            children.child_mask = texture->child_mask;
+            textures_.complete(id, &children);
             textures_.pin(id);
             sink_.put_texture(*texture_slot, texture->blocks);
         }
@@ -66,6 +68,11 @@ ResidentHeight Pager::height(TileId id) const {
 std::int32_t Pager::texture(TileId id) const {
     const TileCache::Entry* entry = textures_.find(id);
     return entry != nullptr && entry->state == TileCache::State::resident ? entry->slot : -1;
+}
+
+std::uint8_t Pager::texture_children(TileId id) const {
+    const TileCache::Entry* entry = textures_.find(id);
+    return entry != nullptr && entry->state == TileCache::State::resident ? entry->header.child_mask : std::uint8_t{0};
 }
 
 bool Pager::unavailable_height(TileId id) const {
@@ -94,7 +101,7 @@ void Pager::accept(LoadedTile&& tile) {
         ++counters_.tiles_paged_in;
     } else {
         sink_.put_texture(job.slot, tile.blocks);
-        textures_.complete(job.id, nullptr);
+        textures_.complete(job.id, &tile.header);
         ++counters_.tiles_paged_in;
     }
     loader_->recycle(std::move(tile));

@@ -49,6 +49,7 @@ public:
 
     ResidentHeight height(TileId id) const override;
     std::int32_t texture(TileId id) const override;
+    std::uint8_t texture_children(TileId id) const override;
     bool unavailable_height(TileId id) const override;
     bool unavailable_texture(TileId id) const override;
 

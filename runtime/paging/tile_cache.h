@@ -23,7 +23,7 @@ public:
         std::int32_t slot = -1;  ///< -1 when unavailable
         std::uint64_t planned_in = 0;  ///< frame in which it was last planned
         bool pinned = false;
-        HeightTileHeader header;  ///< height tiles only
+        HeightTileHeader header;  ///< of a texture tile only the child bits
         std::list<TileId>::iterator position;
     };
 
@@ -37,7 +37,7 @@ public:
     /// Reserves a slot for a tile that is not known yet: a free one, else the least recently used tile's whose
     /// planned_in is before `frame`. Nullopt when there is none.
     std::optional<std::int32_t> reserve(TileId id, std::uint64_t frame);
-    void complete(TileId id, const HeightTileHeader* header);
+    void complete(TileId id, const HeightTileHeader* header);  ///< null: nothing is known of children
     void fail(TileId id);    ///< unreadable: the slot is freed, the tile stays known as unavailable
     void cancel(TileId id);  ///< a request not begun: forgotten, the slot is freed
     void pin(TileId id);

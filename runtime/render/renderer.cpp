@@ -37,15 +37,13 @@ double ms_since(Clock::time_point start) {
 /// All patterns' indices in one buffer. They are local to a tile, so 16 bits serve up to m = 128.
 struct IndexArena {
     BufferHandle buffer;
-    std::vector<PatternRange> ranges;  ///< [geomip * kEdgeMaskCount + mask]
+    TilePatterns patterns{1};  ///< where each pattern and part lies in the buffer
     GLenum type = GL_UNSIGNED_SHORT;
 };
 
 IndexArena make_index_arena(int tile_cells_log2) {
-    const TilePatterns patterns(tile_cells_log2);
-    IndexArena arena;
-    for (int geomip = 0; geomip < patterns.geomip_levels(); ++geomip)
-        for (unsigned mask = 0; mask < kEdgeMaskCount; ++mask) arena.ranges.push_back(patterns.range(geomip, mask));
+    IndexArena arena{{}, TilePatterns(tile_cells_log2)};
+    const TilePatterns& patterns = arena.patterns;
     GLuint name = 0;
     glCreateBuffers(1, &name);
     arena.buffer = BufferHandle(name);
@@ -162,8 +160,7 @@ std::uint64_t Renderer::State::write_draws(std::span<const DrawItem> items, cons
     for (const DrawItem& item : items) {
         assert(options.lattice.contains(item.tile) && item.tile.level <= options.lattice.deepest_level);
         assert(item.edge_mask < kEdgeMaskCount);
-        const PatternRange& pattern =
-            indices.ranges[static_cast<std::size_t>(item.geomip) * kEdgeMaskCount + item.edge_mask];
+        const PatternRange pattern = indices.patterns.range(item.geomip, item.edge_mask, item.part);
         const LatticePoint corner = options.lattice.corner(item.tile);
         const std::int32_t first_vertex = item.height_slot * vertices.slot_vertices();
         Batch& batch = batch_of(item);

@@ -123,12 +123,19 @@ FlightPose overview(const Dataset& d, double fov_deg, double aspect) {
     const Lattice& l = d.lattice;
     const double width = static_cast<double>(l.cells_x) * l.spacing_m, depth = static_cast<double>(l.cells_y) * l.spacing_m;
     const glm::dvec3 middle{l.origin_x_m + width / 2, l.origin_y_m - depth / 2, 0.5 * (d.min_height_m + d.max_height_m)};
-    const double half = 0.5 * std::hypot(width, depth);
-    const double narrow = std::tan(radians(fov_deg) / 2) * std::min(1.0, aspect);
-    const double distance = half * 0.95 / narrow * std::cos(radians(30)) + 0.1 * half;
-    const double heading = radians(-60), pitch = radians(30);
-    return {middle + distance * glm::dvec3(std::cos(heading) * std::cos(pitch), std::sin(heading) * std::cos(pitch), std::sin(pitch)),
-            middle};
+    const double heading = radians(-65), pitch = radians(32);
+    const glm::dvec3 back{std::cos(heading) * std::cos(pitch), std::sin(heading) * std::cos(pitch), std::sin(pitch)};
+    const glm::dvec3 right = glm::normalize(glm::cross(-back, glm::dvec3(0, 0, 1))), up = glm::cross(right, -back);
+    // Near enough that the eight corners of the terrain just fit.
+    const double ty = 0.94 * std::tan(radians(fov_deg) / 2), tx = ty * aspect;
+    double distance = 0;
+    for (int corner = 0; corner < 8; ++corner) {
+        const glm::dvec3 c{(corner & 1 ? 0.5 : -0.5) * width, (corner & 2 ? 0.5 : -0.5) * depth,
+                           (corner & 4 ? 0.5 : -0.5) * (d.max_height_m - d.min_height_m)};
+        const double reach = std::max(std::abs(glm::dot(c, right)) / tx, std::abs(glm::dot(c, up)) / ty);
+        distance = std::max(distance, reach + glm::dot(c, back));
+    }
+    return {middle + distance * back, middle};
 }
 
 }  // namespace scree

@@ -29,7 +29,7 @@ Result<FlightPath> read_flight_path(const std::string& csv);
 /// `frames` poses evenly spaced in index along a path, linearly interpolated; the path itself when frames <= 0.
 FlightPath resample(const FlightPath& path, int frames);
 
-/// Looks at the whole dataset from the south-east of its middle, 30 degrees down.
+/// Looks at the whole dataset from the south, 32 degrees down, as near as its corners allow.
 FlightPose overview(const Dataset& dataset, double fov_deg, double aspect);
 
 }  // namespace scree

@@ -78,7 +78,7 @@ TEST(PageChecksums, ATruncatedPageIsFound) {
     const std::string path = folder.file("store.scree");
     write_small_store(path);
     auto bytes = test::read_bytes(path);
-    bytes.resize(bytes.size() - 1);
+    bytes.pop_back();
     test::write_bytes(path, bytes);
     const auto scan = scan_page_checksums(path);
     ASSERT_TRUE(scan.ok());

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <bit>
 #include <map>
 #include <set>
@@ -156,6 +157,39 @@ TEST(TilePatterns, ThinningCoarsensOnlyTheTrianglesAtTheEdge) {
             return edges;
         };
         EXPECT_EQ(north(fine), north(coarse));
+    }
+}
+
+TEST(TilePatterns, PartsCoverTheirSquareAndTogetherAreTheWhole) {
+    for (const int n : kSizes) {
+        const TilePatterns patterns(n);
+        const std::int64_t pitch = (1 << n) + 1;
+        for (int g = 0; g < n; ++g)
+            for (unsigned mask = 0; mask < kEdgeMaskCount; ++mask)
+                for (int level = 0; level <= patterns.finest_part_level(g); ++level) {
+                    std::uint32_t total = 0;
+                    const std::int64_t side = std::int64_t{1} << (n - level);
+                    for (int y = 0; y < 1 << level; ++y)
+                        for (int x = 0; x < 1 << level; ++x) {
+                            const PatternRange part = patterns.range(g, mask, {level, x, y});
+                            total += part.count;
+                            std::int64_t area = 0;
+                            for (std::uint32_t k = part.first; k < part.first + part.count; k += 3) {
+                                std::array<Point, 3> p{};
+                                for (std::uint32_t c = 0; c < 3; ++c) {
+                                    const std::uint32_t index = patterns.indices()[k + c];
+                                    p[c] = {index % pitch, index / pitch};
+                                    ASSERT_GE(p[c].i, x * side);
+                                    ASSERT_LE(p[c].i, (x + 1) * side);
+                                    ASSERT_GE(p[c].j, y * side);
+                                    ASSERT_LE(p[c].j, (y + 1) * side);
+                                }
+                                area += (p[1].j - p[0].j) * (p[2].i - p[0].i) - (p[1].i - p[0].i) * (p[2].j - p[0].j);
+                            }
+                            ASSERT_EQ(area, 2 * side * side);
+                        }
+                    ASSERT_EQ(total, patterns.range(g, mask).count);
+                }
     }
 }
 

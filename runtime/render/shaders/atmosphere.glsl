@@ -9,7 +9,7 @@ layout(location = kHazeUniform) uniform vec4 haze;
 
 const vec3 kZenith = vec3(0.055, 0.170, 0.480);
 const vec3 kHorizon = vec3(0.560, 0.680, 0.800);
-const vec3 kGround = vec3(0.215, 0.230, 0.215);
+const vec3 kGround = vec3(0.340, 0.405, 0.450);
 const vec3 kSunlight = vec3(1.000, 0.860, 0.640);
 
 // Plain multiplications stand in for pow() and exp(): on software OpenGL the sky costs what it computes.

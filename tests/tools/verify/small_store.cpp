@@ -163,7 +163,7 @@ TextureTile texture_of(Alpha texels, int size_log2) {
     for (int log2 = size_log2; log2 >= 0; --log2) {
         mips.emplace_back();
         append_bc1(texels, 1 << log2, mips.back());
-        texels = halved(texels, 1 << log2, 1 << log2);
+        if (log2 > 0) texels = halved(texels, 1 << log2, 1 << log2);
     }
     TextureTile tile;
     for (auto mip = mips.rbegin(); mip != mips.rend(); ++mip)
