@@ -100,6 +100,12 @@ Result<void> Dataset::check() const {
         return store_error(fmt::format("dataset: texture size 2^{} is outside 16..2048", texture_size_log2));
     if (texture_deepest_level < 0 || texture_deepest_level > kMaxLevel)
         return store_error(fmt::format("dataset: texture level {} is outside 0..30", texture_deepest_level));
+    if (!(height_quantum_error_m >= 0) || !(warp_error_m >= 0) || !finite(height_quantum_error_m) || !finite(warp_error_m))
+        return store_error(fmt::format("dataset: errors of {} m (quantum) and {} m (warp) are not lengths", height_quantum_error_m,
+                                       warp_error_m));
+    if (!tile_key(lattice, {texture_deepest_level, lattice.tiles_x(texture_deepest_level) - 1, lattice.tiles_y(texture_deepest_level) - 1}))
+        return store_error(fmt::format("dataset: texture level {} with {} roots passes the format's keys", texture_deepest_level,
+                                       lattice.root_rows * lattice.root_columns));
     if (height_tiles < 1 || texture_tiles < 1 || present_cells < 1)
         return store_error("dataset: a store holds at least one tile of each kind and one present cell");
     return {};

@@ -77,6 +77,9 @@ Result<std::int64_t> query_integer(const std::string& path, sqlite3* db, const s
 Result<Database> open_reading(const std::string& path) {
     auto db = open_database(path, SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX, nullptr);
     if (!db) return db;
+    // The schema is as hostile as the rest of the file until it has been checked.
+    sqlite3_db_config(db->get(), SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+    sqlite3_db_config(db->get(), SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
     if (auto ok = execute(path, db->get(), "PRAGMA mmap_size=0; PRAGMA cache_size=-512;"); !ok) return ok.error();
     return db;
 }
@@ -146,6 +149,10 @@ Result<Dataset> read_dataset(const std::string& path, sqlite3* db) {
     if (*version != kFormatVersion)
         return Error{ErrorCode::store, fmt::format("{}: format version {}; this program reads version {}", path, *version,
                                                    kFormatVersion)};
+    // A view under one of the names could hold any query.
+    auto tables = query_integer(path, db, "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name IN ('dataset', 'height', 'texture')");
+    if (!tables) return tables.error();
+    if (*tables != 3) return Error{ErrorCode::store, fmt::format("{}: the tables of a store are missing", path)};
     auto statement = prepare(path, db, "SELECT codec, checksum, payload FROM dataset WHERE key = 1");
     if (!statement) return statement.error();
     if (sqlite3_step(statement->get()) != SQLITE_ROW)

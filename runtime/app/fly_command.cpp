@@ -10,6 +10,7 @@
 #include "runtime/app/display.h"
 #include "runtime/app/statistics.h"
 #include "runtime/app/view_options.h"
+#include "runtime/render/png.h"
 
 namespace scree {
 namespace {
@@ -24,6 +25,7 @@ struct FlyOptions {
     bool headless = false;
     int latency_ms = 0;
     std::string csv;
+    std::string last_frame;
 };
 
 struct FlightLog {
@@ -115,6 +117,8 @@ Result<void> run(const ViewOptions& o, const FlyOptions& f) {
     if (!log) return log.error();
     if (!f.csv.empty())
         if (auto ok = write_text(f.csv, log->csv); !ok) return ok;
+    if (!f.last_frame.empty())
+        if (auto ok = write_png(f.last_frame, o.width_px, o.height_px, (*display)->target().read_pixels()); !ok) return ok;
     const auto report = report_of(*log, **scene, o, (*display)->context().renderer());
     if (o.json != "-")
         fmt::print("{} frames on {}: median {:.1f} ms, p99 {:.1f} ms; selection median {:.3f} ms; {:.0f} triangles in {:.0f} tiles (mean)\n"
@@ -139,6 +143,7 @@ int run_fly(int argc, char** argv) {
     app.add_flag("--wait", f.wait, "Complete every frame before the next: reproducible");
     app.add_flag("--headless", f.headless, "Without a window");
     app.add_option("--csv", f.csv, "Write one line a frame");
+    app.add_option("--last-frame", f.last_frame, "Write the last frame as PNG");
     app.add_option("--latency", f.latency_ms, "Delay every read by so many ms, to try a slow disk")->check(CLI::Range(0, 60000));
     if (const int code = parse_arguments(app, argc, argv); code >= 0) return code;
     if (auto ok = check_view_options(o); !ok) return report_error("scree-view fly", ok.error());

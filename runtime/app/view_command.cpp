@@ -71,7 +71,7 @@ Result<void> view(ViewOptions o, double seconds) {
     Hud hud(window);
     Keys keys;
     bool show_hud = true, redraw = true;
-    double fps = 0;
+    double mean_frame_s = 0;  // over frames that were drawn
     const auto start = Clock::now();
     auto last = start;
     while (glfwWindowShouldClose(window) == 0 && !interrupt_flag()) {
@@ -110,8 +110,9 @@ Result<void> view(ViewOptions o, double seconds) {
         redraw = frame.stand_ins;
         (*display)->draw(*camera, frame.selection->to_render(0));
         (*display)->target().blit_to_window(o.width_px, o.height_px);
-        fps = elapsed > 0 ? 0.9 * fps + 0.1 / elapsed : fps;
-        if (show_hud) hud.draw(status_lines(**scene, frame, pose, fps, controls.speed_m_per_s()));
+        const double frame_s = std::chrono::duration<double>(Clock::now() - now).count();
+        mean_frame_s = mean_frame_s > 0 ? 0.9 * mean_frame_s + 0.1 * frame_s : frame_s;
+        if (show_hud) hud.draw(status_lines(**scene, frame, pose, 1 / mean_frame_s, controls.speed_m_per_s()));
         (*display)->context().swap_buffers();
         glfwPollEvents();
     }

@@ -11,7 +11,7 @@
 namespace scree {
 namespace {
 
-constexpr std::int64_t kStagingSlots = 24;     // of each kind: about two frames of a fast disk
+constexpr std::int64_t kStagingSlots = 96;     // of each kind: what two threads decode in a frame of 30 ms
 constexpr std::int64_t kBookkeepingBytes = 160;  // hash map entry, list links, ids
 constexpr double kHeightShare = 0.3;           // 14.6 KB against 43.7 KB: a page for each texture and a quarter more
 

@@ -234,7 +234,7 @@ Colour Landscape::colour(double east_m, double south_m, const Ground& place) con
     const float clump = value_noise(east_m / 19 + 0.3, south_m / 17, salt_ + 21);
     const float steep = std::sqrt(slope_east * slope_east + slope_south * slope_south);
 
-    constexpr Shade kForest{48, 63, 40};
+    constexpr Shade kForest{66, 86, 54};
     constexpr Shade kMeadow{100, 112, 66};
     constexpr Shade kField{136, 134, 92};
     constexpr Shade kTurf{112, 108, 74};

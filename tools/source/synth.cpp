@@ -229,7 +229,7 @@ private:
         for (const char* name : {"dem.tif", "ortho.tif"}) {
             const std::filesystem::path file = directory / name;
             if (!options_.force && std::filesystem::exists(std::filesystem::symlink_status(file, status)))
-                return io_error(fmt::format("{}: exists already; give --force to replace it", file.string()));
+                return Error{ErrorCode::usage, fmt::format("{}: exists; --force replaces it", file.string())};
         }
         struct statvfs space {};
         if (::statvfs(directory.c_str(), &space) == 0) {

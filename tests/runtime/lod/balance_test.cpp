@@ -1,0 +1,131 @@
+// What is drawn is balanced, resident, whole and watertight, whatever is in memory (docs/lod-and-paging.md).
+#include <gtest/gtest.h>
+
+#include "runtime/app/coverage.h"
+#include "tests/runtime/lod/drawn_frame.h"
+#include "tests/runtime/lod/selection_support.h"
+
+namespace scree {
+namespace {
+
+using test::DrawnFrame;
+
+// One drawn frame against every claim; `union_of_views` because an edge may be thinned for a tile that another view sees.
+void expect_whole(const test::SyntheticTerrain& terrain, const test::FakeResidency& residency, const Camera& camera,
+                  const DrawList& draws, const CpuArena& arena, const TilePatterns& patterns) {
+    for (const DrawItem& item : draws) {
+        ASSERT_TRUE(residency.holds(item.tile));
+        ASSERT_EQ(item.height_slot, terrain.index(item.tile));
+    }
+    const DrawnFrame frame(terrain, draws);
+    ASSERT_EQ(frame.unbalanced(), "");
+    ASSERT_EQ(frame.cells_drawn_twice(), 0);
+    ASSERT_EQ(frame.visible_cells_missed(camera), 0);
+    ASSERT_EQ(count_holes(terrain.dataset(), residency, camera, draws), 0);
+    const DrawnMesh mesh = drawn_mesh(terrain.dataset(), patterns, draws, arena);
+    ASSERT_EQ(frame.leak(mesh), "");
+    const CrackReport cracks = count_cracks(terrain.dataset(), draws, mesh);
+    ASSERT_EQ(cracks.open_edges, 0);
+    ASSERT_EQ(cracks.t_junctions, 0);
+}
+
+TEST(Balance, RandomCutsOverRandomResidencyAreWatertightAndDrawEveryVisibleCellOnce) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    std::int64_t thinned = 0, mixed_levels = 0, refined = 0;
+    for (int world = 0; world < 24; ++world) {
+        const auto terrain = test::random_terrain(random, world % 3);
+        const CpuArena arena = test::arena_of(terrain);
+        const TilePatterns patterns(terrain.lattice().tile_cells_log2);
+        Selector selector(terrain.dataset());
+        for (int k = 0; k < 16; ++k) {
+            SCOPED_TRACE("world " + std::to_string(world) + ", cut " + std::to_string(k));
+            test::FakeResidency residency(terrain);
+            residency.add_random(random, k % 4 == 0 ? 100 : test::uniform(random, 0, 100));
+            const std::int64_t roots = terrain.lattice().root_rows * terrain.lattice().root_columns;
+            SelectionSettings settings = test::with_tau(k == 1 ? 0 : std::exp(test::uniform_real(random, -4, 5)));
+            settings.texture_tau_px = std::exp(test::uniform_real(random, -1, 3));
+            if (k % 3 == 0) settings.height_slots = roots + test::uniform(random, 0, 80);
+            const Camera camera = test::random_camera(random, terrain);
+            const Selection& s = selector.select({&camera, 1}, settings, residency);
+            expect_whole(terrain, residency, camera, s.draws[0], arena, patterns);
+            if (HasFatalFailure()) return;
+            for (const DrawItem& item : s.draws[0]) {
+                thinned += item.edge_mask != 0 ? 1 : 0;
+                mixed_levels += item.tile.level != s.draws[0][0].tile.level ? 1 : 0;
+                refined += item.tile.level == terrain.lattice().deepest_level ? 1 : 0;
+            }
+        }
+    }
+    // The claims above mean little unless cuts are uneven.
+    EXPECT_GT(thinned, 1000);
+    EXPECT_GT(mixed_levels, 1000);
+    EXPECT_GT(refined, 1000);
+}
+
+TEST(Balance, HoldsWhereOneLoneTileOfManyLevelsIsMissing) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    for (int world = 0; world < 6; ++world) {
+        const auto terrain = test::random_terrain(random);
+        const CpuArena arena = test::arena_of(terrain);
+        const TilePatterns patterns(terrain.lattice().tile_cells_log2);
+        Selector selector(terrain.dataset());
+        for (int k = 0; k < 20; ++k) {
+            test::FakeResidency residency(terrain);
+            residency.add_all();
+            const auto count = static_cast<int>(terrain.tiles().size());
+            const TileId missing = terrain.tiles()[static_cast<std::size_t>(test::uniform(random, 0, count - 1))];
+            if (missing.level == 0) continue;
+            k % 2 == 0 ? residency.remove(missing) : residency.make_unavailable(missing);
+            const Camera camera = test::random_camera(random, terrain);
+            const Selection& s = selector.select({&camera, 1}, test::with_tau(0.01), residency);
+            expect_whole(terrain, residency, camera, s.draws[0], arena, patterns);
+            if (HasFatalFailure()) return;
+        }
+    }
+}
+
+TEST(Balance, SeveralRootsWithAnAbsentOneBetweenThemStayWatertight) {
+    test::TerrainShape shape;
+    shape.tile_cells_log2 = 2;
+    shape.cells_x = 64;
+    shape.cells_y = 16;
+    const test::SyntheticTerrain terrain(shape, test::rough_heights(5, 400), [](std::int64_t i, std::int64_t) { return i < 16 || i >= 32; });
+    ASSERT_EQ(terrain.lattice().root_columns, 4);
+    ASSERT_EQ(terrain.tile({0, 1, 0}), nullptr);
+    const CpuArena arena = test::arena_of(terrain);
+    const TilePatterns patterns(2);
+    test::FakeResidency residency(terrain);
+    residency.add_all();
+    Selector selector(terrain.dataset());
+    test::Random random(test::seed());
+    for (int k = 0; k < 40; ++k) {
+        const Camera camera = test::random_camera(random, terrain);
+        const Selection& s = selector.select({&camera, 1}, test::with_tau(k % 2 == 0 ? 0 : 4), residency);
+        expect_whole(terrain, residency, camera, s.draws[0], arena, patterns);
+        if (HasFatalFailure()) return;
+    }
+}
+
+TEST(Balance, WithRootsAloneResidentTheRootsAreDrawn) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    const auto terrain = test::random_terrain(random);
+    test::FakeResidency residency(terrain);
+    residency.add_roots();
+    Selector selector(terrain.dataset());
+    for (int k = 0; k < 50; ++k) {
+        const Camera camera = test::random_camera(random, terrain);
+        const Selection& s = selector.select({&camera, 1}, test::with_tau(0), residency);
+        for (const DrawItem& item : s.draws[0]) EXPECT_EQ(item.tile.level, 0);
+        const Frustum frustum(camera);
+        for (const TileId id : terrain.tiles())
+            if (id.level == 0 && frustum.may_see(terrain.box_of(id))) {
+                EXPECT_FALSE(s.draws[0].empty());
+            }
+    }
+}
+
+}  // namespace
+}  // namespace scree

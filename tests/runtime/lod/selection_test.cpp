@@ -1,0 +1,190 @@
+// Selection is a pure function of its arguments.
+#include "runtime/lod/selection.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/runtime/lod/selection_support.h"
+
+namespace scree {
+namespace {
+
+SelectionSettings random_settings(test::Random& random, const test::SyntheticTerrain& terrain) {
+    const std::int64_t roots = terrain.lattice().root_rows * terrain.lattice().root_columns;
+    SelectionSettings settings = test::with_tau(std::exp(test::uniform_real(random, -4, 4)));
+    settings.texture_tau_px = std::exp(test::uniform_real(random, -1, 3));
+    settings.height_slots = roots + test::uniform(random, 0, 200);
+    settings.texture_slots = roots + test::uniform(random, 0, 200);
+    return settings;
+}
+
+TEST(Selection, IsTheSameTwiceAndAfterAnyOtherCallsBetween) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    for (int world = 0; world < 10; ++world) {
+        const auto terrain = test::random_terrain(random, 3);
+        Selector selector(terrain.dataset());
+        for (int k = 0; k < 10; ++k) {
+            test::FakeResidency residency(terrain);
+            residency.add_random(random, test::uniform(random, 0, 110));
+            const std::vector<Camera> views{test::random_camera(random, terrain), test::random_camera(random, terrain)};
+            const SelectionSettings settings = random_settings(random, terrain);
+            const Selection first = selector.select(views, settings, residency);
+            ASSERT_TRUE(test::same_selection(first, selector.select(views, settings, residency)));
+            for (int other = 0; other < 3; ++other) {
+                test::FakeResidency another(terrain);
+                another.add_random(random, 50);
+                const Camera camera = test::random_camera(random, terrain);
+                selector.select({&camera, 1}, random_settings(random, terrain), another);
+            }
+            ASSERT_TRUE(test::same_selection(first, selector.select(views, settings, residency)));
+            ASSERT_TRUE(test::same_selection(first, Selector(terrain.dataset()).select(views, settings, residency)));
+        }
+    }
+}
+
+TEST(Selection, OnceCompleteDoesNotDependOnWhatElseIsResident) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    int limited = 0;
+    for (int world = 0; world < 12; ++world) {
+        const auto terrain = test::random_terrain(random, 3);
+        Selector selector(terrain.dataset());
+        for (int k = 0; k < 12; ++k) {
+            const Camera camera = test::random_camera(random, terrain);
+            const SelectionSettings settings = random_settings(random, terrain);
+            // Full residency, and no more than what it plans.
+            test::FakeResidency everything(terrain);
+            everything.add_all();
+            const Selection full = selector.select({&camera, 1}, settings, everything);
+            ASSERT_TRUE(full.complete);
+            limited += full.budget_limited ? 1 : 0;
+            test::FakeResidency planned(terrain);
+            planned.add_roots();
+            for (const TileId id : full.planned_heights) planned.add(id);
+            for (const TileId id : full.planned_textures) planned.add_texture(id);
+            ASSERT_TRUE(test::same_selection(full, selector.select({&camera, 1}, settings, planned)));
+            test::FakeResidency more = planned;
+            for (const TileId id : terrain.tiles()) {
+                if (test::uniform(random, 0, 1) == 0) more.add(id);
+                if (terrain.has_texture(id) && test::uniform(random, 0, 1) == 0) more.add_texture(id);
+            }
+            ASSERT_TRUE(test::same_selection(full, selector.select({&camera, 1}, settings, more)));
+        }
+    }
+    EXPECT_GT(limited, 10);
+}
+
+TEST(Selection, FillingItsRequestsLeadsFromTheRootsToTheFullCutWithinTheSlots) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    for (int world = 0; world < 12; ++world) {
+        const auto terrain = test::random_terrain(random, 2);
+        Selector selector(terrain.dataset());
+        for (int k = 0; k < 6; ++k) {
+            const Camera camera = test::random_camera(random, terrain);
+            const SelectionSettings settings = random_settings(random, terrain);
+            test::FakeResidency everything(terrain);
+            everything.add_all();
+            const Selection full = selector.select({&camera, 1}, settings, everything);
+            test::FakeResidency residency(terrain);
+            residency.add_roots();
+            int rounds = 0;
+            for (; rounds < 100; ++rounds) {
+                const Selection s = selector.select({&camera, 1}, settings, residency);
+                if (s.complete) break;
+                // What is not planned is lost at once: the hardest pager there could be.
+                test::FakeResidency kept(terrain);
+                kept.add_roots();
+                for (const TileId id : s.planned_heights)
+                    if (residency.holds(id)) kept.add(id);
+                for (const TileId id : s.planned_textures)
+                    if (residency.holds_texture(id)) kept.add_texture(id);
+                residency = kept;
+                for (const TileRequest& r : s.requests) r.kind == TileKind::height ? residency.add(r.id) : residency.add_texture(r.id);
+            }
+            ASSERT_LT(rounds, 100);
+            ASSERT_TRUE(test::same_selection(full, selector.select({&camera, 1}, settings, residency)));
+        }
+    }
+}
+
+TEST(Selection, StandInsAreNeverFinerThanTheFullCutWhenSlotsDoNotBind) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    for (int world = 0; world < 8; ++world) {
+        const auto terrain = test::random_terrain(random);
+        Selector selector(terrain.dataset());
+        for (int k = 0; k < 10; ++k) {
+            test::FakeResidency everything(terrain), some(terrain);
+            everything.add_all();
+            some.add_random(random, 60);
+            const Camera camera = test::random_camera(random, terrain);
+            const SelectionSettings settings = test::with_tau(std::exp(test::uniform_real(random, -2, 3)));
+            const Selection full = selector.select({&camera, 1}, settings, everything);
+            const Selection& s = selector.select({&camera, 1}, settings, some);
+            for (const DrawItem& item : s.draws[0])
+                for (const DrawItem& wanted : full.draws[0]) {
+                    const bool above = wanted.tile.level < item.tile.level && ancestor_at(item.tile, wanted.tile.level) == wanted.tile;
+                    ASSERT_FALSE(above) << "drawn finer than anybody asked for";
+                    if (wanted.tile == item.tile) {
+                        ASSERT_GE(item.geomip, wanted.geomip);
+                    }
+                }
+        }
+    }
+}
+
+TEST(Selection, DrawsEveryLeafWithTheNearestResidentTextureAboveItAtItsPlaceInIt) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    std::int64_t scaled = 0, own = 0;
+    for (int world = 0; world < 8; ++world) {
+        const auto terrain = test::random_terrain(random, 2);
+        Selector selector(terrain.dataset());
+        for (int k = 0; k < 12; ++k) {
+            test::FakeResidency residency(terrain);
+            residency.add_random(random, k % 3 == 0 ? 100 : 60);
+            const Camera camera = test::random_camera(random, terrain);
+            const Selection& s = selector.select({&camera, 1}, test::with_tau(1), residency);
+            for (const DrawItem& item : s.draws[0]) {
+                ASSERT_GE(item.texture_slot, 0);
+                const TileId texture = terrain.tiles()[static_cast<std::size_t>(item.texture_slot)];
+                ASSERT_LE(texture.level, item.tile.level);
+                ASSERT_EQ(ancestor_at(item.tile, texture.level), texture);
+                // The corners of the tile, through scale and offset, where they lie in the texture's extent.
+                const Lattice& l = terrain.lattice();
+                const auto extent = static_cast<double>(l.tile_extent(texture.level));
+                const LatticePoint inner = l.corner(item.tile), outer = l.corner(texture);
+                ASSERT_EQ(static_cast<double>(item.texture_offset_u) * extent, static_cast<double>(inner.i - outer.i));
+                ASSERT_EQ(static_cast<double>(item.texture_offset_v) * extent, static_cast<double>(inner.j - outer.j));
+                ASSERT_EQ(static_cast<double>(item.texture_scale) * extent, static_cast<double>(l.tile_extent(item.tile.level)));
+                ++(texture.level < item.tile.level ? scaled : own);
+            }
+        }
+    }
+    EXPECT_GT(scaled, 100);
+    EXPECT_GT(own, 100);
+}
+
+TEST(Selection, WithSlotsForRootTexturesAloneDrawsThemAndSaysThatSlotsBind) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    const auto terrain = test::random_terrain(random, 4);
+    test::FakeResidency residency(terrain);
+    residency.add_all();
+    Selector selector(terrain.dataset());
+    SelectionSettings settings = test::with_tau(1);
+    settings.texture_slots = terrain.lattice().root_rows * terrain.lattice().root_columns;
+    int limited = 0;
+    for (int k = 0; k < 40; ++k) {
+        const Camera camera = test::random_camera(random, terrain);
+        const Selection& s = selector.select({&camera, 1}, settings, residency);
+        EXPECT_TRUE(s.complete);
+        for (const DrawItem& item : s.draws[0]) EXPECT_EQ(item.texture_slot, terrain.index(ancestor_at(item.tile, 0)));
+        limited += s.budget_limited ? 1 : 0;
+    }
+    EXPECT_GT(limited, 0);
+}
+
+}  // namespace
+}  // namespace scree

@@ -1,0 +1,241 @@
+#include "tests/runtime/lod/synthetic_terrain.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/mesh/geometric_error.h"
+
+namespace scree::test {
+namespace {
+
+std::uint64_t hash(std::uint64_t seed, std::int64_t a, std::int64_t b, int octave) {
+    std::uint64_t h = seed + static_cast<std::uint64_t>(a) * 0x9E3779B97F4A7C15u +
+                      static_cast<std::uint64_t>(b) * 0xC2B2AE3D27D4EB4Fu + static_cast<std::uint64_t>(octave) * 0x165667B19E3779F9u;
+    h = (h ^ (h >> 30)) * 0xBF58476D1CE4E5B9u;
+    h = (h ^ (h >> 27)) * 0x94D049BB133111EBu;
+    return h ^ (h >> 31);
+}
+
+}  // namespace
+
+SyntheticTerrain::SyntheticTerrain(const TerrainShape& shape, HeightFunction height, PresenceFunction present)
+    : height_(std::move(height)), present_(std::move(present)) {
+    auto lattice = make_lattice(300000.5, 2700000.25, shape.spacing_m, shape.cells_x, shape.cells_y, shape.tile_cells_log2);
+    EXPECT_TRUE(lattice.ok());
+    dataset_.lattice = *lattice;
+    dataset_.height_offset_m = 50;
+    dataset_.height_quantum_m = shape.quantum_m;
+    dataset_.texture_size_log2 = shape.texture_size_log2;
+    dataset_.texture_deepest_level = std::min(shape.texture_depth, lattice->deepest_level);
+    for (int level = lattice->deepest_level; level >= 0; --level)
+        for (std::int64_t y = 0; y < lattice->tiles_y(level); ++y)
+            for (std::int64_t x = 0; x < lattice->tiles_x(level); ++x)
+                if (make_tile({level, x, y})) ids_.push_back({level, x, y});
+    std::sort(ids_.begin(), ids_.end());
+    double low = 1e9, high = -1e9;
+    for (std::size_t k = 0; k < ids_.size(); ++k) {
+        indices_[ids_[k]] = static_cast<std::int32_t>(k);
+        dataset_.texture_tiles += has_texture(ids_[k]) ? 1 : 0;
+        low = std::min(low, dataset_.height_m(stored_[ids_[k]].header.own.min_n));
+        high = std::max(high, dataset_.height_m(stored_[ids_[k]].header.own.max_n));
+    }
+    dataset_.min_height_m = low;
+    dataset_.max_height_m = high;
+    dataset_.height_tiles = static_cast<std::int64_t>(ids_.size());
+    EXPECT_TRUE(dataset_.check().ok()) << dataset_.check().error().message;
+}
+
+bool SyntheticTerrain::present(std::int64_t i, std::int64_t j) const {
+    return i >= 0 && j >= 0 && i < lattice().cells_x && j < lattice().cells_y && (!present_ || present_(i, j));
+}
+
+bool SyntheticTerrain::make_tile(TileId id) {
+    const Lattice& l = lattice();
+    const int n = l.tile_cells_log2;
+    const std::int64_t m = l.tile_cells(), step = l.step(id.level);
+    const LatticePoint corner = l.corner(id);
+    HeightTile tile;
+    for (std::int64_t r = 0; r <= m; ++r)
+        for (std::int64_t c = 0; c <= m; ++c) tile.samples.push_back(height_(corner.i + c * step, corner.j + r * step));
+    HeightBounds& own = tile.header.own;
+    own.min_n = *std::min_element(tile.samples.begin(), tile.samples.end());
+    own.max_n = *std::max_element(tile.samples.begin(), tile.samples.end());
+    if (id.level == l.deepest_level) {
+        std::int64_t cells = 0;
+        for (std::int64_t r = 0; r < m; ++r)
+            for (std::int64_t c = 0; c < m; ++c) {
+                tile.presence.push_back(present(corner.i + c, corner.j + r) ? 1 : 0);
+                cells += tile.presence.back();
+            }
+        if (cells == 0) return false;
+        dataset_.present_cells += cells;
+        if (cells == m * m) tile.presence.clear();
+        const auto vertices = present_vertices(tile.presence, n);
+        const auto errors = leaf_errors({tile.samples.data(), vertices.empty() ? nullptr : vertices.data(), n});
+        for (std::size_t g = 0; g < errors.size(); ++g) own.error_n[g] = round_up_to_float(errors[g]);
+        stored_.emplace(id, std::move(tile));
+        return true;
+    }
+    for (int q = 0; q < 4; ++q) {
+        const auto child = stored_.find(child_of(id, q));
+        if (child == stored_.end()) continue;
+        const HeightBounds& bounds = child->second.header.own;
+        tile.header.child_mask = static_cast<std::uint8_t>(tile.header.child_mask | 1 << q);
+        tile.header.children[static_cast<std::size_t>(q)] = bounds;
+        own.min_n = std::min(own.min_n, bounds.min_n);
+        own.max_n = std::max(own.max_n, bounds.max_n);
+        for (std::size_t g = 0; g + 1 < static_cast<std::size_t>(n); ++g)
+            own.error_n[g] = std::max(own.error_n[g], bounds.error_n[g + 1]);
+    }
+    if (tile.header.child_mask == 0) return false;
+    // The coarsest surface is one block: compared with every deepest tile under it.
+    BlockVertices block{};
+    for (std::int64_t k = 0; k < 9; ++k)
+        block[static_cast<std::size_t>(k)] = tile.samples[static_cast<std::size_t>((k / 3 * (m + 1) + k % 3) * m / 2)];
+    double worst = 0;
+    const int up = l.deepest_level - id.level;
+    for (std::int64_t y = id.y << up; y < (id.y + 1) << up; ++y)
+        for (std::int64_t x = id.x << up; x < (id.x + 1) << up; ++x) {
+            const auto leaf = stored_.find({l.deepest_level, x, y});
+            if (leaf == stored_.end()) continue;
+            const auto vertices = present_vertices(leaf->second.presence, n);
+            worst = std::max(worst, coarse_block_error(block, l.tile_extent(id.level) / 2, x * m - corner.i, y * m - corner.j,
+                                                       {leaf->second.samples.data(), vertices.empty() ? nullptr : vertices.data(), n}));
+        }
+    own.error_n[static_cast<std::size_t>(n - 1)] = round_up_to_float(worst);
+    for (std::size_t g = 1; g < static_cast<std::size_t>(n); ++g) own.error_n[g] = std::max(own.error_n[g], own.error_n[g - 1]);
+    stored_.emplace(id, std::move(tile));
+    return true;
+}
+
+const HeightTile* SyntheticTerrain::tile(TileId id) const {
+    const auto found = stored_.find(id);
+    return found == stored_.end() ? nullptr : &found->second;
+}
+
+std::int32_t SyntheticTerrain::index(TileId id) const {
+    const auto found = indices_.find(id);
+    return found == indices_.end() ? -1 : found->second;
+}
+
+TextureTile SyntheticTerrain::texture(TileId id) const {
+    TextureTile texture;
+    texture.child_mask = id.level < dataset_.texture_deepest_level ? tile(id)->header.child_mask : std::uint8_t{0};
+    texture.blocks.assign(bc1_chain_bytes(dataset_.texture_size_log2), 0);
+    // The tile's own index, so that a slot's content says whose it is.
+    for (std::size_t k = 0; k < 4; ++k) texture.blocks[k] = static_cast<std::uint8_t>(index(id) >> (8 * k));
+    return texture;
+}
+
+Box SyntheticTerrain::box_of(TileId id) const {
+    const Lattice& l = lattice();
+    const LatticePoint c = l.corner(id);
+    const HeightBounds& own = tile(id)->header.own;
+    const auto east = static_cast<double>(std::min(c.i + l.tile_extent(id.level), l.cells_x));
+    const auto south = static_cast<double>(std::min(c.j + l.tile_extent(id.level), l.cells_y));
+    return {{l.x_m(static_cast<double>(c.i)), l.y_m(south), dataset_.height_m(own.min_n)},
+            {l.x_m(east), l.y_m(static_cast<double>(c.j)), dataset_.height_m(own.max_n)}};
+}
+
+HeightFunction rough_heights(std::uint64_t seed, int amplitude) {
+    return [seed, amplitude](std::int64_t i, std::int64_t j) {
+        double sum = 0;
+        for (int octave = 0; octave < 6; ++octave) {
+            const std::int64_t cell = std::int64_t{1} << (5 - octave);
+            const double u = static_cast<double>(i % cell) / static_cast<double>(cell);
+            const double v = static_cast<double>(j % cell) / static_cast<double>(cell);
+            const auto corner = [&](int a, int b) {
+                return static_cast<double>(hash(seed, i / cell + a, j / cell + b, octave) >> 40) / 8388608.0 - 1;
+            };
+            const double north = corner(0, 0) * (1 - u) + corner(1, 0) * u;
+            const double south = corner(0, 1) * (1 - u) + corner(1, 1) * u;
+            sum += std::ldexp(north * (1 - v) + south * v, -octave - 1);
+        }
+        return static_cast<std::int32_t>(std::lround(sum * amplitude));
+    };
+}
+
+PresenceFunction with_absent_discs(Random& random, const TerrainShape& shape, int discs) {
+    struct Disc {
+        int i, j, radius;
+    };
+    std::vector<Disc> all;
+    const int x = static_cast<int>(shape.cells_x), y = static_cast<int>(shape.cells_y);
+    for (int k = 0; k < discs; ++k)
+        all.push_back({uniform(random, 0, x), uniform(random, 0, y), uniform(random, 1, std::max(2, std::min(x, y) / 3))});
+    return [all](std::int64_t i, std::int64_t j) {
+        return std::none_of(all.begin(), all.end(), [&](const Disc& d) {
+            return (i - d.i) * (i - d.i) + (j - d.j) * (j - d.j) < std::int64_t{d.radius} * d.radius;
+        });
+    };
+}
+
+SyntheticTerrain random_terrain(Random& random, int texture_depth) {
+    TerrainShape shape;
+    shape.tile_cells_log2 = uniform(random, 2, 4);
+    const int m = 1 << shape.tile_cells_log2;
+    const int tiles = 1 << uniform(random, 2, shape.tile_cells_log2 == 4 ? 3 : 4);  // 3 to 5 levels with one root
+    shape.cells_x = m * tiles - uniform(random, 0, 1) * uniform(random, 0, m);
+    shape.cells_y = m * tiles - uniform(random, 0, 1) * uniform(random, 0, m * tiles / 2);
+    if (uniform(random, 0, 3) == 0) shape.cells_y = std::max<std::int64_t>(m, shape.cells_x / uniform(random, 2, 5));
+    shape.texture_depth = texture_depth;
+    const int amplitude = 1 << uniform(random, 4, 11);
+    const std::uint64_t seed = random();
+    const HeightFunction rough = rough_heights(seed, amplitude);
+    const std::int64_t flat_from = uniform(random, 0, 2) == 0 ? shape.cells_x / 2 : shape.cells_x * 4;
+    const bool noise = uniform(random, 0, 4) == 0;
+    const HeightFunction heights = [=](std::int64_t i, std::int64_t j) -> std::int32_t {
+        if (i >= flat_from) return 7;
+        if (noise) return static_cast<std::int32_t>(hash(seed, i, j, 99) % static_cast<std::uint64_t>(amplitude));
+        return rough(i, j);
+    };
+    const int discs = uniform(random, 0, 3);
+    return SyntheticTerrain(shape, heights, discs > 0 ? with_absent_discs(random, shape, discs) : PresenceFunction{});
+}
+
+Camera random_camera(Random& random, const SyntheticTerrain& terrain) {
+    const Lattice& l = terrain.lattice();
+    const auto at = [&](double u, double v, double z) {
+        return glm::dvec3(l.x_m(u * static_cast<double>(l.cells_x)), l.y_m(v * static_cast<double>(l.cells_y)), z);
+    };
+    const double margin = uniform(random, 0, 2) == 0 ? 1.0 : 0.0;
+    const double ground = terrain.dataset().max_height_m, extent = l.spacing_m * static_cast<double>(l.cells_x);
+    const glm::dvec3 eye = at(uniform_real(random, -margin, 1 + margin), uniform_real(random, -margin, 1 + margin),
+                              ground + extent * std::exp(uniform_real(random, -8, 1.5)) - uniform(random, 0, 3) * 5);
+    const glm::dvec3 look = at(uniform_real(random, 0, 1), uniform_real(random, 0, 1), uniform_real(random, ground - 100, ground));
+    auto camera = look_at(eye, look, uniform_real(random, 5, 120), uniform(random, 50, 2000), uniform(random, 50, 2000));
+    EXPECT_TRUE(camera.ok());
+    return *camera;
+}
+
+void FakeResidency::add_all() {
+    for (const TileId id : terrain_.tiles()) {
+        heights_.insert(id);
+        if (terrain_.has_texture(id)) textures_.insert(id);
+    }
+}
+
+void FakeResidency::add_roots() {
+    for (const TileId id : terrain_.tiles())
+        if (id.level == 0) {
+            heights_.insert(id);
+            textures_.insert(id);
+        }
+}
+
+void FakeResidency::add_random(Random& random, int percent) {
+    add_roots();
+    for (const TileId id : terrain_.tiles()) {
+        if (uniform(random, 0, 99) < percent) heights_.insert(id);
+        if (terrain_.has_texture(id) && uniform(random, 0, 99) < percent) textures_.insert(id);
+    }
+}
+
+ResidentHeight FakeResidency::height(TileId id) const {
+    if (!heights_.contains(id)) return {};
+    return {&terrain_.tile(id)->header, terrain_.index(id)};
+}
+
+std::int32_t FakeResidency::texture(TileId id) const { return textures_.contains(id) ? terrain_.index(id) : -1; }
+
+}  // namespace scree::test
