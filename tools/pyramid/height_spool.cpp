@@ -8,6 +8,7 @@
 #include <cassert>
 #include <cerrno>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 
 namespace scree {
@@ -74,9 +75,10 @@ std::int64_t HeightSpool::bytes_needed(std::int64_t width, std::int64_t height, 
 
 Result<std::unique_ptr<HeightSpool>> HeightSpool::create(const std::string& path, std::int64_t width, std::int64_t height,
                                                          bool wide) {
-    const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+    std::string name = path + ".XXXXXX";
+    const int fd = ::mkostemp(name.data(), O_CLOEXEC);
     if (fd < 0) return io_error(path, "cannot create");
-    ::unlink(path.c_str());
+    ::unlink(name.c_str());
     return std::unique_ptr<HeightSpool>(new HeightSpool(fd, path, width, height, wide));
 }
 

@@ -25,7 +25,7 @@ public:
         double min_raw = 0, max_raw = 0;  ///< over valid samples
     };
 
-    /// A file at `path`, unlinked at once: it vanishes with the process. `wide`: values do not fit float32.
+    /// A file of a new name that begins with `path`, unlinked at once: it vanishes with the process. `wide`: values do not fit float32.
     static Result<std::unique_ptr<HeightSpool>> create(const std::string& path, std::int64_t width, std::int64_t height,
                                                        bool wide);
     static std::int64_t bytes_needed(std::int64_t width, std::int64_t height, bool wide);
