@@ -1,6 +1,8 @@
 #include "common/report.h"
 
 #include <fmt/format.h>
+#include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -23,8 +25,19 @@ extern "C" void on_signal(int) {
 
 }  // namespace
 
+void guard_standard_descriptors() {
+    for (int fd = 0; fd <= 2; ++fd)
+        if (::fcntl(fd, F_GETFD) == -1 && errno == EBADF) (void)!::open("/dev/null", fd == 0 ? O_RDONLY : O_WRONLY);
+}
+
+int finish_output(const char* program, int code) {
+    if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
+    note("{}: cannot write to standard output\n", program);
+    return code == 0 ? static_cast<int>(ErrorCode::io) : code;
+}
+
 int report_error(const char* program, const Error& error) {
-    fmt::print(stderr, "{}: {}\n", program, error.message);
+    note("{}: {}\n", program, error.message);
     return static_cast<int>(error.code);
 }
 
@@ -32,6 +45,14 @@ Result<void> write_text(const std::string& file, const std::string& text) {
     if (file == "-") {
         if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
             return Error{ErrorCode::io, "cannot write to standard output"};
+        return {};
+    }
+    struct stat status {};
+    if (::stat(file.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {  // a device or a pipe takes text, not a new name
+        std::FILE* device = S_ISDIR(status.st_mode) ? nullptr : std::fopen(file.c_str(), "wb");
+        const bool written = device != nullptr && std::fwrite(text.data(), 1, text.size(), device) == text.size();
+        if (device == nullptr || std::fclose(device) != 0 || !written)
+            return Error{ErrorCode::io, fmt::format("{}: cannot be written", file)};
         return {};
     }
     const std::string partial = file + ".partial";

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "common/report.h"
+
 namespace scree {
 namespace {
 constexpr std::chrono::milliseconds kTerminalInterval{200};
@@ -48,9 +50,9 @@ void Progress::print(double done, bool last) {
     std::string line = fmt::format("{}: {:3.0f} %  {:.1f} {}/s", job_, 100 * share, rate, unit_);
     line += last ? fmt::format("  {:.1f} s", seconds) : fmt::format("  {:.0f} s left", left);
     if (terminal_)
-        fmt::print(stderr, "\r{:<72}", line);
+        note("\r{:<72}", line);
     else
-        fmt::print(stderr, "{}\n", line);
+        note("{}\n", line);
     std::fflush(stderr);
     printed_ = true;
 }

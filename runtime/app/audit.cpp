@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "common/mesh/drawn_surface.h"
 #include "common/mesh/geometric_error.h"
@@ -28,11 +29,12 @@ struct Projector {
 }  // namespace
 
 void ErrorHistogram::add(double px) {
+    if (std::isnan(px)) px = std::numeric_limits<double>::infinity();  // what cannot be measured is no small error
     ++count_;
     sum_ += px;
     max_ = std::max(max_, px);
-    const int bin = px <= kFirstBinPx ? 0 : 1 + static_cast<int>(std::log(px / kFirstBinPx) / std::log(kBinRatio));
-    ++bins_[static_cast<std::size_t>(std::min(bin, kBins - 1))];
+    const double bin = px <= kFirstBinPx ? 0 : 1 + std::log(px / kFirstBinPx) / std::log(kBinRatio);
+    ++bins_[bin < kBins - 1 ? static_cast<std::size_t>(bin) : static_cast<std::size_t>(kBins - 1)];
 }
 
 void ErrorHistogram::merge(const ErrorHistogram& other) {
@@ -46,6 +48,7 @@ double ErrorHistogram::quantile(double q) const {
     std::int64_t left = static_cast<std::int64_t>(std::ceil(q * static_cast<double>(count_)));
     for (std::size_t k = 0; k < bins_.size(); ++k) {
         left -= bins_[k];
+        if (left <= 0 && k + 1 == bins_.size()) return max_;
         if (left <= 0) return k == 0 ? 0 : std::min(max_, kFirstBinPx * std::pow(kBinRatio, static_cast<double>(k)));
     }
     return max_;

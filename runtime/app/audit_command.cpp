@@ -39,6 +39,7 @@ Result<AuditResult> audit(const ViewOptions& o, int frames) {
     const TilePatterns patterns(d.lattice.tile_cells_log2);
     AuditResult result;
     for (const FlightPose& pose : *path) {
+        if (interrupt_flag()) return Error{ErrorCode::interrupted, "stopped"};
         auto camera = camera_of(pose, o);
         if (!camera) return camera.error();
         auto frame = (*scene)->complete({&*camera, 1}, [] { return interrupt_flag().load(); });

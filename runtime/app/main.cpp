@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "common/report.h"
 #include "runtime/app/commands.h"
 
 namespace {
@@ -28,12 +29,13 @@ int dispatch(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+    scree::guard_standard_descriptors();
     try {
-        return dispatch(argc, argv);
+        return scree::finish_output("scree-view", dispatch(argc, argv));
     } catch (const std::bad_alloc&) {
-        fmt::print(stderr, "scree-view: out of memory\n");
+        scree::note("scree-view: out of memory\n");
     } catch (const std::exception& error) {
-        fmt::print(stderr, "scree-view: {}\n", error.what());
+        scree::note("scree-view: {}\n", error.what());
     }
     return 5;
 }

@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <limits>
 
+#include "common/report.h"
+
 namespace scree {
 
 Scene::Scene(const SqliteStore& store, const SceneOptions& options, const MemoryPlan& memory)
@@ -21,7 +23,7 @@ Result<void> Scene::start(TileSink& sink) {
     auto pager = Pager::create(store_, {memory_, options_.loader_threads, options_.latency_ms, options_.textures}, sink);
     if (!pager) return pager.error();
     pager_ = std::move(*pager);
-    pager_->on_damage = [path = store_.path()](const std::string& what) { fmt::print(stderr, "{}: {}\n", path, what); };
+    pager_->on_damage = [path = store_.path()](const std::string& what) { note("{}: {}\n", path, what); };
     return {};
 }
 

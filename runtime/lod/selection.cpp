@@ -52,8 +52,10 @@ struct Selector::Impl {
         const double side = std::ldexp(static_cast<double>(l.tile_extent(node.id.level)), -part.level);
         const LatticePoint corner = l.corner(node.id);
         const double i = static_cast<double>(corner.i) + part.x * side, j = static_cast<double>(corner.j) + part.y * side;
-        const Box box{{l.x_m(i), l.y_m(j + side), dataset.height_m(node.bounds.min_n)},
-                      {l.x_m(i + side), l.y_m(j), dataset.height_m(node.bounds.max_n)}};
+        const double east = std::min(i + side, static_cast<double>(l.cells_x)), south = std::min(j + side, static_cast<double>(l.cells_y));
+        if (east <= i || south <= j) return kInfinity;
+        const Box box{{l.x_m(i), l.y_m(south), dataset.height_m(node.bounds.min_n)},
+                      {l.x_m(east), l.y_m(j), dataset.height_m(node.bounds.max_n)}};
         double least = kInfinity;
         for (const LodView& view : views)
             if (view.frustum.may_see(box)) least = std::min(least, std::max(distance_to_box(view.eye, box), view.near_m) / view.focal_px);

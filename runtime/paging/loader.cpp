@@ -1,6 +1,7 @@
 #include "runtime/paging/loader.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <condition_variable>
 #include <deque>
@@ -19,7 +20,7 @@ struct Loader::Impl {
     std::condition_variable work_ready, tile_ready;
     std::vector<LoadJob> queue;  // least urgent first: jobs leave at the back
     std::deque<LoadedTile> finished;
-    std::vector<LoadedTile> spare;
+    std::array<std::vector<LoadedTile>, 2> spare;  // by kind: a buffer serves tiles of its own kind only
     std::int64_t being_read = 0;
     bool stopping = false;
     std::vector<std::thread> threads;
@@ -30,6 +31,7 @@ struct Loader::Impl {
         const Dataset& dataset = store.dataset();
         const int n = dataset.lattice.tile_cells_log2;
         tile.error.clear();
+        tile.bytes_read = 0;
         auto found = reader.read(tile.job.kind, tile.job.id, row);
         if (!found || !*found) {
             tile.error = found ? "is missing from the store" : found.error().message;
@@ -63,9 +65,10 @@ struct Loader::Impl {
             work_ready.wait(lock, [&] { return stopping || !queue.empty(); });
             if (stopping) return;
             LoadedTile tile;
-            if (!spare.empty()) {
-                tile = std::move(spare.back());
-                spare.pop_back();
+            auto& buffers = spare[static_cast<std::size_t>(queue.back().kind)];
+            if (!buffers.empty()) {
+                tile = std::move(buffers.back());
+                buffers.pop_back();
             }
             tile.job = queue.back();
             queue.pop_back();
@@ -127,7 +130,7 @@ bool Loader::take(LoadedTile& out, bool wait) {
 
 void Loader::recycle(LoadedTile&& tile) {
     const std::lock_guard lock(impl_->mutex);
-    impl_->spare.push_back(std::move(tile));
+    impl_->spare[static_cast<std::size_t>(tile.job.kind)].push_back(std::move(tile));
 }
 
 std::int64_t Loader::under_way() const {

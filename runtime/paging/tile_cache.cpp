@@ -16,8 +16,8 @@ const TileCache::Entry* TileCache::find(TileId id) const {
 }
 
 void TileCache::touch_planned(std::span<const TileId> ids, std::uint64_t frame) {
-    for (const TileId id : ids) {
-        const auto it = entries_.find(id);
+    for (auto id = ids.rbegin(); id != ids.rend(); ++id) {
+        const auto it = entries_.find(*id);
         if (it == entries_.end()) continue;
         it->second.planned_in = frame;
         if (it->second.state == State::resident) recency_.splice(recency_.begin(), recency_, it->second.position);
@@ -25,8 +25,8 @@ void TileCache::touch_planned(std::span<const TileId> ids, std::uint64_t frame) 
 }
 
 void TileCache::touch(std::span<const TileId> ids) {
-    for (const TileId id : ids) {
-        const auto it = entries_.find(id);
+    for (auto id = ids.rbegin(); id != ids.rend(); ++id) {
+        const auto it = entries_.find(*id);
         if (it != entries_.end() && it->second.state == State::resident)
             recency_.splice(recency_.begin(), recency_, it->second.position);
     }

@@ -30,9 +30,10 @@ public:
     explicit TileCache(std::int64_t capacity);
 
     const Entry* find(TileId id) const;
-    /// Marks tiles as planned in this frame (most recently used, not to be evicted in it).
+    /// Marks tiles as planned in this frame (most recently used, not to be evicted in it). The first of the list becomes the
+    /// most recent: give parents before children, and children go first.
     void touch_planned(std::span<const TileId> ids, std::uint64_t frame);
-    /// Marks tiles as used, evictable.
+    /// Marks tiles as used, evictable; order as above.
     void touch(std::span<const TileId> ids);
     /// Reserves a slot for a tile that is not known yet: a free one, else the least recently used tile's whose
     /// planned_in is before `frame`. Nullopt when there is none.

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -27,18 +28,21 @@ Result<Camera> look_at(glm::dvec3 eye, glm::dvec3 target, double fov_deg, int wi
         return Error{ErrorCode::usage, fmt::format("fov {} degrees is outside 0.001..179", fov_deg)};
     if (width_px < 1 || height_px < 1 || width_px > 16384 || height_px > 16384)
         return Error{ErrorCode::usage, fmt::format("size {}x{} px is outside 1..16384", width_px, height_px)};
-    const glm::dvec3 direction = target - eye;
-    const double length = glm::length(direction);
-    if (!(length > 0))
+    glm::dvec3 direction = target - eye;
+    // Divided by its largest part first: the squares of very long and very short directions leave the range of a double.
+    const double largest = std::max({std::abs(direction.x), std::abs(direction.y), std::abs(direction.z)});
+    if (!(largest > 0))
         return Error{ErrorCode::usage, "the camera's eye and look are the same point, so it has no direction"};
+    if (!std::isfinite(largest)) return Error{ErrorCode::usage, "the camera's eye and look are too far apart"};
+    direction = glm::dvec3(direction.x / largest, direction.y / largest, direction.z / largest);
     Camera camera;
     camera.eye = eye;
     camera.fov_deg = fov_deg;
     camera.width_px = width_px;
     camera.height_px = height_px;
-    camera.forward = direction / length;
+    camera.forward = glm::normalize(direction);
     glm::dvec3 right = glm::cross(camera.forward, glm::dvec3(0, 0, 1));
-    if (glm::length(right) < 1e-9) right = {1, 0, 0};
+    if (glm::length(right) < 1e-9) right = {camera.forward.z < 0 ? 1 : -1, 0, 0};
     camera.up = glm::normalize(glm::cross(glm::normalize(right), camera.forward));
     return camera;
 }

@@ -24,9 +24,9 @@ Result<double> ground_or_floor(Ground& ground, const Dataset& d, glm::dvec3 p) {
     return height->value_or(d.min_height_m);
 }
 
-}  // namespace
+constexpr int kKeyPoses = 301;  // a hundred a part: the path does not depend on how many frames are flown along it
 
-Result<FlightPath> default_flight(const TileStore& store, int frames) {
+Result<FlightPath> key_poses(const TileStore& store) {
     const Dataset& d = store.dataset();
     const Lattice& l = d.lattice;
     auto ground = Ground::open(store);
@@ -37,8 +37,8 @@ Result<FlightPath> default_flight(const TileStore& store, int frames) {
     const auto at = [&](double u, double v) { return west_south + glm::dvec3(u * width, v * depth, 0); };
 
     FlightPath path;
-    for (int k = 0; k < frames; ++k) {
-        const double t = frames == 1 ? 0 : 3.0 * k / (frames - 1);
+    for (int k = 0; k < kKeyPoses; ++k) {
+        const double t = 3.0 * k / (kKeyPoses - 1);
         const double u = std::clamp(t - std::floor(std::min(t, 2.0)), 0.0, 1.0);
         FlightPose pose;
         double heading = 0, pitch = 0, above = 0;  // heading from east towards north
@@ -82,6 +82,14 @@ Result<FlightPath> default_flight(const TileStore& store, int frames) {
     return path;
 }
 
+}  // namespace
+
+Result<FlightPath> default_flight(const TileStore& store, int frames) {
+    auto path = key_poses(store);
+    if (!path) return path;
+    return frames > 0 ? resample(*path, frames) : FlightPath{};
+}
+
 Result<FlightPath> read_flight_path(const std::string& csv) {
     std::ifstream in(csv);
     if (!in) return Error{ErrorCode::input, fmt::format("{}: cannot be read", csv)};
@@ -100,6 +108,8 @@ Result<FlightPath> read_flight_path(const std::string& csv) {
                 return Error{ErrorCode::input, fmt::format("{}: line {}: '{}' is not six numbers", csv, number, line)};
             p = next + (k < 5 ? 1 : 0);
         }
+        if (line.find_first_not_of(" \t\r", static_cast<std::size_t>(p - line.data())) != std::string::npos)
+            return Error{ErrorCode::input, fmt::format("{}: line {}: '{}' is more than six numbers", csv, number, line)};
         path.push_back({{values[0], values[1], values[2]}, {values[3], values[4], values[5]}});
     }
     if (path.empty()) return Error{ErrorCode::input, fmt::format("{}: holds no pose", csv)};

@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
@@ -26,7 +27,12 @@ std::string contents_of(int fd) {
     return text;
 }
 
-[[noreturn]] void become(const std::string& program, std::vector<char*>& argv, const ProgramOptions& options, int out, int err) {
+int open_output(const std::string& file) {
+    return file.empty() ? ::memfd_create("output", MFD_CLOEXEC) : ::open(file.c_str(), O_WRONLY | O_CLOEXEC);
+}
+
+[[noreturn]] void become(const std::string& program, std::vector<char*>& argv, const ProgramOptions& options, int out,
+                         int err) {
     for (const std::string& entry : options.environment) {
         const std::size_t equals = entry.find('=');
         if (equals == std::string::npos)
@@ -49,10 +55,9 @@ std::string contents_of(int fd) {
 
 }  // namespace
 
-ProgramRun run_program(const std::string& program, const std::vector<std::string>& arguments, const ProgramOptions& options) {
-    const int out = options.standard_output.empty() ? ::memfd_create("stdout", MFD_CLOEXEC)
-                                                    : ::open(options.standard_output.c_str(), O_WRONLY | O_CLOEXEC);
-    const int err = ::memfd_create("stderr", MFD_CLOEXEC);
+ProgramRun run_program(const std::string& program, const std::vector<std::string>& arguments,
+                       const ProgramOptions& options) {
+    const int out = open_output(options.standard_output), err = open_output(options.standard_error);
     if (out < 0 || err < 0) throw std::runtime_error("no place for a child's output");
     std::vector<std::string> words{program};
     words.insert(words.end(), arguments.begin(), arguments.end());
@@ -87,7 +92,7 @@ ProgramRun run_program(const std::string& program, const std::vector<std::string
     run.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
     run.peak_rss_bytes = std::int64_t{usage.ru_maxrss} * 1024;
     if (options.standard_output.empty()) run.out = contents_of(out);
-    run.err = contents_of(err);
+    if (options.standard_error.empty()) run.err = contents_of(err);
     ::close(out);
     ::close(err);
     return run;
@@ -113,8 +118,8 @@ bool on_path(const std::string& name) {
 }
 
 std::string describe(const ProgramRun& run) {
-    return "exit " + std::to_string(run.exit_code) + (run.timed_out ? " (killed: too slow)" : "") + "\n--- stdout\n" + run.out +
-           "\n--- stderr\n" + run.err;
+    return "exit " + std::to_string(run.exit_code) + (run.timed_out ? " (killed: too slow)" : "") + "\n--- stdout\n" +
+           run.out + "\n--- stderr\n" + run.err;
 }
 
 }  // namespace scree::test

@@ -18,16 +18,25 @@ struct ProgramRun {
 };
 
 struct ProgramOptions {
-    double limit_s = 100;                     ///< killed after so long: a hang is a failure, not a stuck test run
-    std::vector<std::string> environment;     ///< "NAME=VALUE" sets, "NAME" removes
-    std::string standard_output;              ///< a file instead of a pipe, such as /dev/full
-    std::int64_t largest_file_bytes = -1;     ///< writes beyond fail as on a full disk
-    int signal = 0;                           ///< sent once, as soon as `signal_when` says so
+    double limit_s = 100;                  ///< killed after so long: a hang is a failure, not a stuck test run
+    std::vector<std::string> environment;  ///< "NAME=VALUE" sets, "NAME" removes
+    std::string standard_output;           ///< a file to write to instead, such as /dev/full
+    std::string standard_error;            ///< the same
+    std::int64_t largest_file_bytes = -1;  ///< writes beyond fail as on a full disk
+    int signal = 0;                        ///< sent once, as soon as `signal_when` says so
     std::function<bool()> signal_when;
-    std::function<void()> meanwhile;          ///< called every few milliseconds
+    std::function<void()> meanwhile;  ///< called every few milliseconds
 };
 
-ProgramRun run_program(const std::string& program, const std::vector<std::string>& arguments, const ProgramOptions& options = {});
+/// The defaults with another limit.
+inline ProgramOptions within(double limit_s) {
+    ProgramOptions options;
+    options.limit_s = limit_s;
+    return options;
+}
+
+ProgramRun run_program(const std::string& program, const std::vector<std::string>& arguments,
+                       const ProgramOptions& options = {});
 
 /// `scree` and `scree-view` of this build.
 ProgramRun scree(const std::vector<std::string>& arguments, const ProgramOptions& options = {});

@@ -10,8 +10,10 @@ namespace {
 
 TEST(Digest, DoesNotDependOnThreadsMemoryOrRepetition) {
     const TemporaryFolder folder;
-    ASSERT_EQ(scree({"synth", "-o", folder.file("land"), "--size", "300", "--imagery-scale", "3", "--quiet"}).exit_code, 0);
-    const std::string dem = folder.file("land/dem.tif"), ortho = folder.file("land/ortho.tif"), store = folder.file("s.scree");
+    ASSERT_EQ(scree({"synth", "-o", folder.file("land"), "--size", "300", "--imagery-scale", "3", "--quiet"}).exit_code,
+              0);
+    const std::string dem = folder.file("land/dem.tif"), ortho = folder.file("land/ortho.tif"),
+                      store = folder.file("s.scree");
     build_store_from({dem, "--imagery", ortho}, store);
     const std::string digest = digest_of(store);
     const std::vector<std::vector<std::string>> ways = {{},
@@ -37,7 +39,9 @@ TEST(Digest, OneChangedSampleOrPixelChangesIt) {
     HeightGrid grid = hills(50, 40, 3);
     const Place whole{399995, 5300005, 5, 32633, true};
     int changed_x = -1;
-    const Colour colour = [&](int x, int y, int c) { return x == changed_x && y == 20 ? 255u - patchwork(x, y, c) : patchwork(x, y, c); };
+    const Colour colour = [&](int x, int y, int c) {
+        return x == changed_x && y == 20 ? 255u - patchwork(x, y, c) : patchwork(x, y, c);
+    };
     const auto digest = [&] {
         write_heights(folder.file("d.tif"), grid);
         write_image(folder.file("i.tif"), 100, 80, 3, 8, &whole, colour);
@@ -55,7 +59,9 @@ TEST(Digest, OneChangedSampleOrPixelChangesIt) {
 TEST(Digest, SyntheticLandIsTheSameForAnyThreads) {
     const TemporaryFolder folder;
     for (const char* threads : {"1", "2", "4"})
-        ASSERT_EQ(scree({"synth", "-o", folder.file(threads), "--size", "129", "--imagery-scale", "2", "--threads", threads, "--quiet"}).exit_code,
+        ASSERT_EQ(scree({"synth", "-o", folder.file(threads), "--size", "129", "--imagery-scale", "2", "--threads",
+                         threads, "--quiet"})
+                      .exit_code,
                   0);
     for (const char* name : {"/dem.tif", "/ortho.tif"}) {
         EXPECT_EQ(read_bytes(folder.file("1") + name), read_bytes(folder.file("2") + name));

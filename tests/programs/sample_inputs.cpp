@@ -39,7 +39,8 @@ TestTiff layout(const HeightGrid& grid, const char* nodata) {
 }  // namespace
 
 HeightGrid hills(int width, int height, std::uint64_t seed, double amplitude_m) {
-    HeightGrid grid{width, height, std::vector<float>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height))};
+    HeightGrid grid{width, height,
+                    std::vector<float>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height))};
     std::mt19937_64 random(seed);
     const auto phase = [&] { return static_cast<double>(random() % 10000) / 1000; };
     double a[6], b[6], p[6];
@@ -52,7 +53,8 @@ HeightGrid hills(int width, int height, std::uint64_t seed, double amplitude_m) 
     for (int j = 0; j < height; ++j)
         for (int i = 0; i < width; ++i) {
             double z = 0;
-            for (int k = 0; k < 6; ++k) z += std::exp2(-k) * std::sin(6.28 * (a[k] * i + (k % 2 == 0 ? b[k] : -b[k]) * j) + p[k]);
+            for (int k = 0; k < 6; ++k)
+                z += std::exp2(-k) * std::sin(6.28 * (a[k] * i + (k % 2 == 0 ? b[k] : -b[k]) * j) + p[k]);
             grid.at(i, j) = static_cast<float>(std::round(1000 + amplitude_m * z + static_cast<double>(random() % 5)));
         }
     return grid;
@@ -88,7 +90,8 @@ void write_geographic_heights(const std::string& path, const HeightGrid& grid) {
     write(path, t, grid.z.data());
 }
 
-void write_image(const std::string& path, int width, int height, int channels, int bits, const Place* place, const Colour& colour) {
+void write_image(const std::string& path, int width, int height, int channels, int bits, const Place* place,
+                 const Colour& colour) {
     TestTiff t;
     t.width = static_cast<std::uint32_t>(width);
     t.height = static_cast<std::uint32_t>(height);

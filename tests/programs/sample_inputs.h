@@ -12,7 +12,9 @@ namespace scree::test {
 struct HeightGrid {
     int width = 0, height = 0;
     std::vector<float> z;
-    float& at(int i, int j) { return z[static_cast<std::size_t>(j) * static_cast<std::size_t>(width) + static_cast<std::size_t>(i)]; }
+    float& at(int i, int j) {
+        return z[static_cast<std::size_t>(j) * static_cast<std::size_t>(width) + static_cast<std::size_t>(i)];
+    }
     float at(int i, int j) const { return const_cast<HeightGrid&>(*this).at(i, j); }
 };
 
@@ -26,16 +28,20 @@ struct Place {
     bool area = false;
 };
 
-void write_heights(const std::string& path, const HeightGrid& grid, const Place& place = {}, const char* nodata = nullptr);
+void write_heights(const std::string& path, const HeightGrid& grid, const Place& place = {},
+                   const char* nodata = nullptr);
 /// Whole metres as 16-bit integers; no georeference when `place` is null.
-void write_heights_u16(const std::string& path, const HeightGrid& grid, const Place* place, const char* nodata = nullptr);
-void write_heights_i16(const std::string& path, const HeightGrid& grid, const Place& place, const char* nodata = nullptr);
+void write_heights_u16(const std::string& path, const HeightGrid& grid, const Place* place,
+                       const char* nodata = nullptr);
+void write_heights_i16(const std::string& path, const HeightGrid& grid, const Place& place,
+                       const char* nodata = nullptr);
 /// Degrees instead of metres.
 void write_geographic_heights(const std::string& path, const HeightGrid& grid);
 
 using Colour = std::function<std::uint32_t(int x, int y, int channel)>;
 /// 8 or 16 bits a channel, 1 to 4 channels, PixelIsArea.
-void write_image(const std::string& path, int width, int height, int channels, int bits, const Place* place, const Colour& colour);
+void write_image(const std::string& path, int width, int height, int channels, int bits, const Place* place,
+                 const Colour& colour);
 /// Something colourful.
 std::uint32_t patchwork(int x, int y, int channel);
 

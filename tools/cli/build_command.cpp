@@ -14,10 +14,10 @@ namespace {
 void print_plan(const BuildPlan& plan) {
     const Dataset& d = plan.dataset;
     const Lattice& l = d.lattice;
-    fmt::print(stderr, "lattice: {} x {} cells of {} m, {} levels, {} x {} root{}{}\n", l.cells_x, l.cells_y, l.spacing_m,
+    note("lattice: {} x {} cells of {} m, {} levels, {} x {} root{}{}\n", l.cells_x, l.cells_y, l.spacing_m,
                l.deepest_level + 1, l.root_rows, l.root_columns, l.root_rows * l.root_columns == 1 ? "" : "s",
                d.crs.empty() ? "" : ", " + d.crs);
-    fmt::print(stderr, "textures: {} levels, {} m a texel; memory: about {} MiB\n", d.texture_deepest_level + 1,
+    note("textures: {} levels, {} m a texel; memory: about {} MiB\n", d.texture_deepest_level + 1,
                d.texel_m(d.texture_deepest_level), plan.memory_bytes >> 20);
 }
 
@@ -72,7 +72,7 @@ int run_build(int argc, char** argv) {
     auto report = build_store(std::move(*plan), options, interrupt_flag());
     if (!report) return report_error("scree build", report.error());
     if (!options.quiet)
-        fmt::print(stderr, "{}: {:.1f} MB, {} height tiles, {} texture tiles; {:.1f} s, {:.1f} CPU s, peak {} MiB\n", options.out,
+        note("{}: {:.1f} MB, {} height tiles, {} texture tiles; {:.1f} s, {:.1f} CPU s, peak {} MiB\n", options.out,
                    static_cast<double>(report->store_bytes) / 1e6, report->height_tiles, report->texture_tiles, report->seconds,
                    report->cpu_seconds, report->peak_rss_bytes >> 20);
     if (json.empty()) return 0;

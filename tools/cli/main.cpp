@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "common/report.h"
 #include "tools/cli/build_command.h"
 #include "tools/cli/export_command.h"
 #include "tools/cli/info_command.h"
@@ -38,6 +39,7 @@ void print_help() {
 }  // namespace
 
 int main(int argc, char** argv) {
+    scree::guard_standard_descriptors();
     const std::string_view name = argc > 1 ? argv[1] : "";
     if (name == "--help" || name == "-h") return print_help(), 0;
     if (name == "--version") return fmt::print("scree {}\n", SCREE_VERSION), 0;
@@ -46,18 +48,18 @@ int main(int argc, char** argv) {
         std::string title = "scree " + std::string(name);
         argv[1] = title.data();
         try {
-            return c.run(argc - 1, argv + 1);
+            return scree::finish_output(title.c_str(), c.run(argc - 1, argv + 1));
         } catch (const std::bad_alloc&) {
-            fmt::print(stderr, "{}: out of memory\n", title);
+            scree::note("{}: out of memory\n", title);
             return 5;
         } catch (const std::exception& error) {
-            fmt::print(stderr, "{}: {}\n", title, error.what());
+            scree::note("{}: {}\n", title, error.what());
             return 5;
         }
     }
     if (name.empty())
-        fmt::print(stderr, "scree: a command is missing; scree --help lists them\n");
+        scree::note("scree: a command is missing; scree --help lists them\n");
     else
-        fmt::print(stderr, "scree: no command '{}'; scree --help lists them\n", name);
+        scree::note("scree: no command '{}'; scree --help lists them\n", name);
     return 2;
 }

@@ -63,10 +63,10 @@ int run_synth(int argc, char** argv) {
     if (!report) return report_error("scree synth", report.error());
     progress.finish();
     if (!quiet) {
-        fmt::print(stderr, "{}: {} x {} samples, {:.0f} to {:.0f} m, {:.1f} s\n", report->dem_path, report->dem_samples,
+        note("{}: {} x {} samples, {:.0f} to {:.0f} m, {:.1f} s\n", report->dem_path, report->dem_samples,
                    report->dem_samples, report->lowest_m, report->highest_m, report->dem_seconds);
         if (!report->ortho_path.empty())
-            fmt::print(stderr, "{}: {} x {} pixels, {:.1f} s\n", report->ortho_path, report->ortho_pixels,
+            note("{}: {} x {} pixels, {:.1f} s\n", report->ortho_path, report->ortho_pixels,
                        report->ortho_pixels, report->ortho_seconds);
     }
     if (!json_target.empty())

@@ -2,7 +2,8 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/resource.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
@@ -12,11 +13,14 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <limits>
+#include <memory>
 #include <thread>
 
+#include "common/report.h"
 #include "common/process_usage.h"
 #include "tools/progress.h"
 #include "tools/pyramid/height_pyramid.h"
@@ -30,12 +34,31 @@ namespace {
 
 constexpr std::int64_t kSpoolBandRows = 16;
 
-// Removes a half-written file unless it was given its final name.
+// The file that grows under OUT.partial: locked, so that two builds of one store cannot meet in it, and removed unless it was
+// given its final name.
 class PartialFile {
 public:
-    explicit PartialFile(std::string path) : path_(std::move(path)) { std::filesystem::remove(path_, ignored_); }
+    static Result<std::unique_ptr<PartialFile>> create(const std::string& path) {
+        for (;;) {
+            const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+            if (fd < 0) return Error{ErrorCode::io, fmt::format("{}: {}", path, std::strerror(errno))};
+            std::unique_ptr<PartialFile> file(new PartialFile(path, fd));
+            if (::flock(fd, LOCK_EX | LOCK_NB) != 0) {
+                file->kept_ = true;
+                return Error{ErrorCode::usage, fmt::format("{}: another build is writing it", path)};
+            }
+            // The file may have been renamed or removed between opening and locking.
+            struct stat held {}, named {};
+            if (::fstat(fd, &held) == 0 && ::stat(path.c_str(), &named) == 0 && held.st_ino == named.st_ino) {
+                if (::ftruncate(fd, 0) != 0) return Error{ErrorCode::io, fmt::format("{}: {}", path, std::strerror(errno))};
+                return file;
+            }
+            file->kept_ = true;
+        }
+    }
     ~PartialFile() {
-        if (!kept_) std::filesystem::remove(path_, ignored_);
+        if (!kept_) std::remove(path_.c_str());
+        ::close(fd_);
     }
     PartialFile(const PartialFile&) = delete;
     PartialFile& operator=(const PartialFile&) = delete;
@@ -45,7 +68,8 @@ public:
         if (std::rename(path_.c_str(), final_path.c_str()) != 0)
             return Error{ErrorCode::io, fmt::format("{}: cannot rename to {}: {}", path_, final_path, std::strerror(errno))};
         kept_ = true;
-        const std::string folder = std::filesystem::absolute(final_path, ignored_).parent_path().string();
+        std::error_code ignored;
+        const std::string folder = std::filesystem::absolute(final_path, ignored).parent_path().string();
         const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
         if (fd >= 0) {
             ::fsync(fd);  // makes the new name durable; a file system that cannot is no reason to fail
@@ -55,8 +79,9 @@ public:
     }
 
 private:
+    PartialFile(std::string path, int fd) : path_(std::move(path)), fd_(fd) {}
     std::string path_;
-    std::error_code ignored_;
+    int fd_;
     bool kept_ = false;
 };
 
@@ -211,6 +236,9 @@ Result<std::int64_t> build_textures(TextureStage& s) {
 
 Result<void> announce_build(const BuildPlan& plan, const BuildOptions& options) {
     std::error_code error;
+    for (const std::string* input : {&options.dem, options.imagery ? &*options.imagery : nullptr})
+        if (input != nullptr && std::filesystem::equivalent(*input, options.out, error))
+            return Error{ErrorCode::usage, fmt::format("{}: is an input, and the output would replace it", options.out)};
     if (std::filesystem::exists(options.out, error) && !options.force)
         return Error{ErrorCode::usage, fmt::format("{}: exists; --force replaces it", options.out)};
     const auto folder = std::filesystem::absolute(options.out, error).parent_path();
@@ -220,7 +248,7 @@ Result<void> announce_build(const BuildPlan& plan, const BuildOptions& options) 
     const auto free_bytes = static_cast<double>(space.f_bavail) * static_cast<double>(space.f_frsize);
     const double needed = static_cast<double>(plan.temporary_bytes + plan.store_bytes_estimate);
     if (!options.quiet)
-        fmt::print(stderr, "disk: up to {:.1f} MB for the store and {:.1f} MB while building; {:.0f} MB are free\n",
+        note("disk: up to {:.1f} MB for the store and {:.1f} MB while building; {:.0f} MB are free\n",
                    static_cast<double>(plan.store_bytes_estimate) / 1e6, static_cast<double>(plan.temporary_bytes) / 1e6,
                    free_bytes / 1e6);
     if (needed > free_bytes)
@@ -240,10 +268,11 @@ Result<BuildReport> build_store(BuildPlan plan, const BuildOptions& options, con
     if (plan.imagery)
         image_pixels = static_cast<double>(plan.imagery->info().width) * static_cast<double>(plan.imagery->info().height) / 1e6;
 
-    PartialFile partial(options.out + ".partial");
+    auto partial = PartialFile::create(options.out + ".partial");
+    if (!partial) return partial.error();
     auto spool = HeightSpool::create(options.out + ".heights", dem.width, dem.height, !fits_float32(dem.type));
     if (!spool) return spool.error();
-    auto writer = SqliteStoreWriter::create(partial.path());
+    auto writer = SqliteStoreWriter::create((*partial)->path());
     if (!writer) return writer.error();
     Progress progress("building", "MPix", options.quiet);
     progress.set_total(2 * dem_pixels + image_pixels);
@@ -276,7 +305,7 @@ Result<BuildReport> build_store(BuildPlan plan, const BuildOptions& options, con
     d.texture_tiles = *textures;
     if (auto ok = (*writer)->finish(d); !ok) return ok.error();
     if (stop) return interrupted();
-    if (auto ok = partial.rename_to(options.out); !ok) return ok.error();
+    if (auto ok = (*partial)->rename_to(options.out); !ok) return ok.error();
     progress.finish();
 
     BuildReport report;

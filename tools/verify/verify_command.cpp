@@ -22,9 +22,9 @@ public:
         if (percent < shown_ + (terminal_ ? 1 : 10) && !(percent == 100 && shown_ < 100)) return;
         shown_ = percent;
         if (terminal_)
-            fmt::print(stderr, "\rverify: {:3} %{}", percent, percent < 100 ? "" : "\n");
+            note("\rverify: {:3} %{}", percent, percent < 100 ? "" : "\n");
         else
-            fmt::print(stderr, "verify: {:3} %\n", percent);
+            note("verify: {:3} %\n", percent);
     }
 
 private:

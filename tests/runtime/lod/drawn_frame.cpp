@@ -41,7 +41,8 @@ std::int64_t DrawnFrame::visible_cells_missed(const Camera& camera) const {
             bool seen = false;
             for (int k = 0; k < 4; ++k) {
                 const std::int64_t u = i + k % 2, v = j + k / 2;
-                seen |= frustum.contains({l.x_m(static_cast<double>(u)), l.y_m(static_cast<double>(v)), terrain_.height_m(u, v)});
+                seen |= frustum.contains(
+                    {l.x_m(static_cast<double>(u)), l.y_m(static_cast<double>(v)), terrain_.height_m(u, v)});
             }
             missed += seen ? 1 : 0;
         }
@@ -63,8 +64,9 @@ std::string DrawnFrame::unbalanced() const {
     for (std::int64_t j = 0; j < height_; ++j)
         for (std::int64_t i = 0; i < width_; ++i) {
             const std::int32_t here = item_at(i, j), east = item_at(i + 1, j), south = item_at(i, j + 1);
-            for (const std::string& problem : {look_across(here, east, kEdgeEast), look_across(east, here, kEdgeWest),
-                                               look_across(here, south, kEdgeSouth), look_across(south, here, kEdgeNorth)})
+            for (const std::string& problem :
+                 {look_across(here, east, kEdgeEast), look_across(east, here, kEdgeWest),
+                  look_across(here, south, kEdgeSouth), look_across(south, here, kEdgeNorth)})
                 if (!problem.empty()) return problem;
         }
     for (std::size_t k = 0; k < draws_.size(); ++k)
@@ -84,7 +86,8 @@ std::string DrawnFrame::leak(const DrawnMesh& mesh) const {
         twice_area += area;
         for (std::size_t k = 0; k < 3; ++k) ++uses[{mesh.corners[t + k], mesh.corners[t + (k + 1) % 3]}];
     }
-    if (twice_area != 2 * drawn_) return fmt::format("triangles of area {} over {} cells", twice_area * 0.5, drawn_);
+    if (twice_area != 2 * drawn_)
+        return fmt::format("triangles of twice the area {} over {} cells", twice_area, drawn_);
     for (const auto& [edge, count] : uses) {
         const auto& [a, b] = edge;
         if (count != 1) return fmt::format("the edge {}, {} - {}, {} is used twice one way", a.i, a.j, b.i, b.j);

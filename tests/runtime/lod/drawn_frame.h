@@ -1,5 +1,5 @@
-// DrawnFrame: a draw list laid out over the finest cells, and everything that must hold of it, found without the code of
-// runtime/lod or runtime/app.
+// DrawnFrame: a draw list laid out over the finest cells, and everything that must hold of it, found without the code
+// of runtime/lod or runtime/app.
 #pragma once
 
 #include <vector>
@@ -15,7 +15,9 @@ public:
     DrawnFrame(const SyntheticTerrain& terrain, const DrawList& draws);
 
     /// Exponent of the stride in which an item is drawn, in finest cells.
-    int exponent(const DrawItem& item) const { return terrain_.lattice().deepest_level - item.tile.level + item.geomip; }
+    int exponent(const DrawItem& item) const {
+        return terrain_.lattice().deepest_level - item.tile.level + item.geomip;
+    }
     /// Finest cells (padding included) drawn more than once.
     std::int64_t cells_drawn_twice() const { return twice_; }
     std::int64_t cells_drawn() const { return drawn_; }

@@ -17,14 +17,20 @@ Camera camera_at(glm::dvec3 eye, glm::dvec3 look, double fov_deg = 40) {
 }
 
 struct World {
-    World(const TerrainShape& shape, const test::HeightFunction& height) : terrain(shape, height), residency(terrain), selector(terrain.dataset()) {
+    World(const TerrainShape& shape, const test::HeightFunction& height)
+        : terrain(shape, height), residency(terrain), selector(terrain.dataset()) {
         residency.add_all();
     }
-    const Selection& select(const Camera& camera, double tau_px) { return selector.select({&camera, 1}, test::with_tau(tau_px), residency); }
-    glm::dvec3 at(double i, double j, double z) const { return {terrain.lattice().x_m(i), terrain.lattice().y_m(j), z}; }
+    const Selection& select(const Camera& camera, double tau_px) {
+        return selector.select({&camera, 1}, test::with_tau(tau_px), residency);
+    }
+    glm::dvec3 at(double i, double j, double z) const {
+        return {terrain.lattice().x_m(i), terrain.lattice().y_m(j), z};
+    }
     int finest_exponent(const Selection& s) const {
         int finest = 99;
-        for (const DrawItem& item : s.draws[0]) finest = std::min(finest, terrain.lattice().deepest_level - item.tile.level + item.geomip);
+        for (const DrawItem& item : s.draws[0])
+            finest = std::min(finest, terrain.lattice().deepest_level - item.tile.level + item.geomip);
         return finest;
     }
     int coarsest_possible() const { return terrain.lattice().deepest_level + terrain.lattice().tile_cells_log2 - 1; }
@@ -44,7 +50,9 @@ TEST(Extremes, ARampOrAFlatStaysAtItsCoarsestForEveryTolerance) {
         for (int n = 2; n <= 4; ++n) {
             TerrainShape shape;
             shape.tile_cells_log2 = n;
-            World world(shape, [&](std::int64_t i, std::int64_t j) { return flat ? -17 : static_cast<std::int32_t>(700 * i - 311 * j + 5); });
+            World world(shape, [&](std::int64_t i, std::int64_t j) {
+                return flat ? -17 : static_cast<std::int32_t>(700 * i - 311 * j + 5);
+            });
             for (const double tau : kTolerances)
                 for (int k = 0; k < 10; ++k) {
                     const Camera camera = test::random_camera(random, world.terrain);
@@ -64,7 +72,10 @@ TEST(Extremes, AToleranceOfZeroLeavesNoError) {
     test::Random random(test::seed());
     std::int64_t kept_coarse = 0;
     for (int world = 0; world < 10; ++world) {
-        const auto terrain = test::random_terrain(random);
+        const auto rough = test::rough_heights(random(), 500);
+        const SyntheticTerrain half_flat(TerrainShape{},
+                                         [=](std::int64_t i, std::int64_t j) { return i < 40 ? 3 : rough(i, j); });
+        const SyntheticTerrain terrain = world % 2 == 0 ? half_flat : test::random_terrain(random);
         FakeResidency residency(terrain);
         residency.add_all();
         Selector selector(terrain.dataset());
@@ -94,9 +105,11 @@ TEST(Extremes, ASpikeIsRefinedExactlyWhenItsPixelsPassTheTolerance) {
     const HeightBounds& own = world.terrain.tile(leaf)->header.own;
     ASSERT_EQ(own.error_n[0], 0);  // inside the tile: thinning its border does not touch it
     for (TileId id = leaf; id.level >= 0; id = parent_of(id))
-        for (std::size_t g = id == leaf ? 1 : 0; g < 3; ++g) ASSERT_EQ(world.terrain.tile(id)->header.own.error_n[g], kSpike);
+        for (std::size_t g = id == leaf ? 1 : 0; g < 3; ++g)
+            ASSERT_EQ(world.terrain.tile(id)->header.own.error_n[g], kSpike);
     const Box box = world.terrain.box_of(leaf);
-    for (const glm::dvec3 eye : {world.at(21, 43, 5000), world.at(600, -900, 300), world.at(21, -2000, 60), world.at(-40, 43, 55)}) {
+    for (const glm::dvec3 eye :
+         {world.at(21, 43, 5000), world.at(600, -900, 300), world.at(21, -2000, 60), world.at(-40, 43, 55)}) {
         const Camera camera = camera_at(eye, world.at(20, 44, 50));
         const double distance = distance_to_box(eye, box);
         const double px = camera.focal_px() * camera.off_axis_factor() * height_m / distance;
@@ -146,7 +159,8 @@ TEST(Extremes, LevelToLevelErrorsThatAddUpAreBoundedTogether) {
     const std::int32_t truth = ridge(3, 0);
     ASSERT_GT(truth, 2 * kUnit);
     const Camera camera = camera_at(world.at(16, 16, 3000), world.at(16, 16, 50));
-    const double px_per_unit = camera.focal_px() * camera.off_axis_factor() * 0.25 / distance_to_box(camera.eye, world.terrain.box_of({0, 0, 0}));
+    const double px_per_unit = camera.focal_px() * camera.off_axis_factor() * 0.25 /
+                               distance_to_box(camera.eye, world.terrain.box_of({0, 0, 0}));
     // Stride 8 (exponent 3) misses by `truth`, not by one level's correction.
     const TileId pages[] = {{levels - 2, 0, 0}, {levels - 1, 0, 0}};
     EXPECT_GE(world.terrain.tile(pages[1])->header.own.error_n[1], kUnit);
@@ -190,7 +204,8 @@ TEST(Extremes, NarrowViewsAndHugeDistancesNeitherOverflowNorLoseTheTerrain) {
         for (const double distance : {1e3, 1e6, 4e9, 1e10})
             for (const double tau : {1e-3, 1.0, 1e3}) {
                 const glm::dvec3 middle = world.at(32, 32, 50);
-                const Camera camera = camera_at(middle + glm::normalize(glm::dvec3(0.3, -1, 0.5)) * distance, middle, fov);
+                const Camera camera =
+                    camera_at(middle + glm::normalize(glm::dvec3(0.3, -1, 0.5)) * distance, middle, fov);
                 const Selection& s = world.select(camera, tau);
                 ASSERT_FALSE(s.draws[0].empty()) << fov << " deg at " << distance;
                 ASSERT_TRUE(std::isfinite(s.max_bound_px));

@@ -20,7 +20,8 @@ private:
     Random random_;
 };
 
-MemoryStore::MemoryStore(const SyntheticTerrain& terrain, int max_latency_us) : terrain_(terrain), max_latency_us_(max_latency_us) {}
+MemoryStore::MemoryStore(const SyntheticTerrain& terrain, int max_latency_us)
+    : terrain_(terrain), max_latency_us_(max_latency_us) {}
 
 Result<std::unique_ptr<TileReader>> MemoryStore::open_reader() const {
     const std::lock_guard lock(mutex_);

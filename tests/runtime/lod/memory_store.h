@@ -37,7 +37,9 @@ public:
     std::int64_t payload_bytes() const;  ///< of all rows handed out
     std::vector<Key> order() const;      ///< in which reads began
     bool read_twice_at_once() const;
-    std::int64_t payload_size(TileKind kind, TileId id) const { return static_cast<std::int64_t>(row(kind, id).size()); }
+    std::int64_t payload_size(TileKind kind, TileId id) const {
+        return static_cast<std::int64_t>(row(kind, id).size());
+    }
 
 private:
     friend class MemoryReader;

@@ -20,8 +20,8 @@ SelectionSettings random_settings(test::Random& random, const test::SyntheticTer
 TEST(Selection, IsTheSameTwiceAndAfterAnyOtherCallsBetween) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());
-    for (int world = 0; world < 10; ++world) {
-        const auto terrain = test::random_terrain(random, 3);
+    for (int world = 0; world < 30; ++world) {
+        const auto terrain = test::random_terrain(random, world % 3 == 0 ? test::kDeepTextures : 3);
         Selector selector(terrain.dataset());
         for (int k = 0; k < 10; ++k) {
             test::FakeResidency residency(terrain);
@@ -46,8 +46,8 @@ TEST(Selection, OnceCompleteDoesNotDependOnWhatElseIsResident) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());
     int limited = 0;
-    for (int world = 0; world < 12; ++world) {
-        const auto terrain = test::random_terrain(random, 3);
+    for (int world = 0; world < 50; ++world) {
+        const auto terrain = test::random_terrain(random, world % 3 == 0 ? test::kDeepTextures : 3);
         Selector selector(terrain.dataset());
         for (int k = 0; k < 12; ++k) {
             const Camera camera = test::random_camera(random, terrain);
@@ -64,10 +64,10 @@ TEST(Selection, OnceCompleteDoesNotDependOnWhatElseIsResident) {
             for (const TileId id : full.planned_textures) planned.add_texture(id);
             ASSERT_TRUE(test::same_selection(full, selector.select({&camera, 1}, settings, planned)));
             test::FakeResidency more = planned;
-            for (const TileId id : terrain.tiles()) {
+            for (const TileId id : terrain.tiles())
                 if (test::uniform(random, 0, 1) == 0) more.add(id);
-                if (terrain.has_texture(id) && test::uniform(random, 0, 1) == 0) more.add_texture(id);
-            }
+            for (const TileId id : terrain.textures())
+                if (test::uniform(random, 0, 1) == 0) more.add_texture(id);
             ASSERT_TRUE(test::same_selection(full, selector.select({&camera, 1}, settings, more)));
         }
     }
@@ -77,8 +77,8 @@ TEST(Selection, OnceCompleteDoesNotDependOnWhatElseIsResident) {
 TEST(Selection, FillingItsRequestsLeadsFromTheRootsToTheFullCutWithinTheSlots) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());
-    for (int world = 0; world < 12; ++world) {
-        const auto terrain = test::random_terrain(random, 2);
+    for (int world = 0; world < 50; ++world) {
+        const auto terrain = test::random_terrain(random, world % 2 == 0 ? test::kDeepTextures : 2);
         Selector selector(terrain.dataset());
         for (int k = 0; k < 6; ++k) {
             const Camera camera = test::random_camera(random, terrain);
@@ -100,7 +100,8 @@ TEST(Selection, FillingItsRequestsLeadsFromTheRootsToTheFullCutWithinTheSlots) {
                 for (const TileId id : s.planned_textures)
                     if (residency.holds_texture(id)) kept.add_texture(id);
                 residency = kept;
-                for (const TileRequest& r : s.requests) r.kind == TileKind::height ? residency.add(r.id) : residency.add_texture(r.id);
+                for (const TileRequest& r : s.requests)
+                    r.kind == TileKind::height ? residency.add(r.id) : residency.add_texture(r.id);
             }
             ASSERT_LT(rounds, 100);
             ASSERT_TRUE(test::same_selection(full, selector.select({&camera, 1}, settings, residency)));
@@ -111,7 +112,7 @@ TEST(Selection, FillingItsRequestsLeadsFromTheRootsToTheFullCutWithinTheSlots) {
 TEST(Selection, StandInsAreNeverFinerThanTheFullCutWhenSlotsDoNotBind) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());
-    for (int world = 0; world < 8; ++world) {
+    for (int world = 0; world < 40; ++world) {
         const auto terrain = test::random_terrain(random);
         Selector selector(terrain.dataset());
         for (int k = 0; k < 10; ++k) {
@@ -124,7 +125,8 @@ TEST(Selection, StandInsAreNeverFinerThanTheFullCutWhenSlotsDoNotBind) {
             const Selection& s = selector.select({&camera, 1}, settings, some);
             for (const DrawItem& item : s.draws[0])
                 for (const DrawItem& wanted : full.draws[0]) {
-                    const bool above = wanted.tile.level < item.tile.level && ancestor_at(item.tile, wanted.tile.level) == wanted.tile;
+                    const bool above =
+                        wanted.tile.level < item.tile.level && ancestor_at(item.tile, wanted.tile.level) == wanted.tile;
                     ASSERT_FALSE(above) << "drawn finer than anybody asked for";
                     if (wanted.tile == item.tile) {
                         ASSERT_GE(item.geomip, wanted.geomip);
@@ -138,7 +140,7 @@ TEST(Selection, DrawsEveryLeafWithTheNearestResidentTextureAboveItAtItsPlaceInIt
     SCREE_TRACE_SEED();
     test::Random random(test::seed());
     std::int64_t scaled = 0, own = 0;
-    for (int world = 0; world < 8; ++world) {
+    for (int world = 0; world < 40; ++world) {
         const auto terrain = test::random_terrain(random, 2);
         Selector selector(terrain.dataset());
         for (int k = 0; k < 12; ++k) {
@@ -148,7 +150,7 @@ TEST(Selection, DrawsEveryLeafWithTheNearestResidentTextureAboveItAtItsPlaceInIt
             const Selection& s = selector.select({&camera, 1}, test::with_tau(1), residency);
             for (const DrawItem& item : s.draws[0]) {
                 ASSERT_GE(item.texture_slot, 0);
-                const TileId texture = terrain.tiles()[static_cast<std::size_t>(item.texture_slot)];
+                const TileId texture = terrain.textures()[static_cast<std::size_t>(item.texture_slot)];
                 ASSERT_LE(texture.level, item.tile.level);
                 ASSERT_EQ(ancestor_at(item.tile, texture.level), texture);
                 // The corners of the tile, through scale and offset, where they lie in the texture's extent.
@@ -157,7 +159,8 @@ TEST(Selection, DrawsEveryLeafWithTheNearestResidentTextureAboveItAtItsPlaceInIt
                 const LatticePoint inner = l.corner(item.tile), outer = l.corner(texture);
                 ASSERT_EQ(static_cast<double>(item.texture_offset_u) * extent, static_cast<double>(inner.i - outer.i));
                 ASSERT_EQ(static_cast<double>(item.texture_offset_v) * extent, static_cast<double>(inner.j - outer.j));
-                ASSERT_EQ(static_cast<double>(item.texture_scale) * extent, static_cast<double>(l.tile_extent(item.tile.level)));
+                ASSERT_EQ(static_cast<double>(item.texture_scale) * extent,
+                          static_cast<double>(l.tile_extent(item.tile.level)));
                 ++(texture.level < item.tile.level ? scaled : own);
             }
         }
@@ -180,7 +183,8 @@ TEST(Selection, WithSlotsForRootTexturesAloneDrawsThemAndSaysThatSlotsBind) {
         const Camera camera = test::random_camera(random, terrain);
         const Selection& s = selector.select({&camera, 1}, settings, residency);
         EXPECT_TRUE(s.complete);
-        for (const DrawItem& item : s.draws[0]) EXPECT_EQ(item.texture_slot, terrain.index(ancestor_at(item.tile, 0)));
+        for (const DrawItem& item : s.draws[0])
+            EXPECT_EQ(item.texture_slot, terrain.texture_index(ancestor_at(item.tile, 0)));
         limited += s.budget_limited ? 1 : 0;
     }
     EXPECT_GT(limited, 0);

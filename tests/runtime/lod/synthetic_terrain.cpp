@@ -10,7 +10,8 @@ namespace {
 
 std::uint64_t hash(std::uint64_t seed, std::int64_t a, std::int64_t b, int octave) {
     std::uint64_t h = seed + static_cast<std::uint64_t>(a) * 0x9E3779B97F4A7C15u +
-                      static_cast<std::uint64_t>(b) * 0xC2B2AE3D27D4EB4Fu + static_cast<std::uint64_t>(octave) * 0x165667B19E3779F9u;
+                      static_cast<std::uint64_t>(b) * 0xC2B2AE3D27D4EB4Fu +
+                      static_cast<std::uint64_t>(octave) * 0x165667B19E3779F9u;
     h = (h ^ (h >> 30)) * 0xBF58476D1CE4E5B9u;
     h = (h ^ (h >> 27)) * 0x94D049BB133111EBu;
     return h ^ (h >> 31);
@@ -20,13 +21,14 @@ std::uint64_t hash(std::uint64_t seed, std::int64_t a, std::int64_t b, int octav
 
 SyntheticTerrain::SyntheticTerrain(const TerrainShape& shape, HeightFunction height, PresenceFunction present)
     : height_(std::move(height)), present_(std::move(present)) {
-    auto lattice = make_lattice(300000.5, 2700000.25, shape.spacing_m, shape.cells_x, shape.cells_y, shape.tile_cells_log2);
+    auto lattice =
+        make_lattice(300000.5, 2700000.25, shape.spacing_m, shape.cells_x, shape.cells_y, shape.tile_cells_log2);
     EXPECT_TRUE(lattice.ok());
     dataset_.lattice = *lattice;
     dataset_.height_offset_m = 50;
     dataset_.height_quantum_m = shape.quantum_m;
     dataset_.texture_size_log2 = shape.texture_size_log2;
-    dataset_.texture_deepest_level = std::min(shape.texture_depth, lattice->deepest_level);
+    dataset_.texture_deepest_level = std::min(shape.texture_depth, lattice->deepest_level + shape.tile_cells_log2);
     for (int level = lattice->deepest_level; level >= 0; --level)
         for (std::int64_t y = 0; y < lattice->tiles_y(level); ++y)
             for (std::int64_t x = 0; x < lattice->tiles_x(level); ++x)
@@ -35,14 +37,36 @@ SyntheticTerrain::SyntheticTerrain(const TerrainShape& shape, HeightFunction hei
     double low = 1e9, high = -1e9;
     for (std::size_t k = 0; k < ids_.size(); ++k) {
         indices_[ids_[k]] = static_cast<std::int32_t>(k);
-        dataset_.texture_tiles += has_texture(ids_[k]) ? 1 : 0;
         low = std::min(low, dataset_.height_m(stored_[ids_[k]].header.own.min_n));
         high = std::max(high, dataset_.height_m(stored_[ids_[k]].header.own.max_n));
     }
+    make_textures();
     dataset_.min_height_m = low;
     dataset_.max_height_m = high;
     dataset_.height_tiles = static_cast<std::int64_t>(ids_.size());
     EXPECT_TRUE(dataset_.check().ok()) << dataset_.check().error().message;
+}
+
+// A texture is stored wherever a present cell lies under it, down to one of a single cell.
+void SyntheticTerrain::make_textures() {
+    const Lattice& l = lattice();
+    std::unordered_set<TileId, TileIdHash> stored;
+    const int finest = l.deepest_level + l.tile_cells_log2;
+    for (std::int64_t j = 0; j < l.cells_y; ++j)
+        for (std::int64_t i = 0; i < l.cells_x; ++i)
+            if (present(i, j))
+                for (int level = 0; level <= dataset_.texture_deepest_level; ++level)
+                    stored.insert(ancestor_at({finest, i, j}, level));
+    texture_ids_.assign(stored.begin(), stored.end());
+    std::sort(texture_ids_.begin(), texture_ids_.end());
+    for (std::size_t k = 0; k < texture_ids_.size(); ++k)
+        texture_indices_[texture_ids_[k]] = static_cast<std::int32_t>(k);
+    dataset_.texture_tiles = static_cast<std::int64_t>(texture_ids_.size());
+}
+
+std::int32_t SyntheticTerrain::texture_index(TileId id) const {
+    const auto found = texture_indices_.find(id);
+    return found == texture_indices_.end() ? -1 : found->second;
 }
 
 bool SyntheticTerrain::present(std::int64_t i, std::int64_t j) const {
@@ -99,11 +123,14 @@ bool SyntheticTerrain::make_tile(TileId id) {
             const auto leaf = stored_.find({l.deepest_level, x, y});
             if (leaf == stored_.end()) continue;
             const auto vertices = present_vertices(leaf->second.presence, n);
-            worst = std::max(worst, coarse_block_error(block, l.tile_extent(id.level) / 2, x * m - corner.i, y * m - corner.j,
-                                                       {leaf->second.samples.data(), vertices.empty() ? nullptr : vertices.data(), n}));
+            worst = std::max(
+                worst,
+                coarse_block_error(block, l.tile_extent(id.level) / 2, x * m - corner.i, y * m - corner.j,
+                                   {leaf->second.samples.data(), vertices.empty() ? nullptr : vertices.data(), n}));
         }
     own.error_n[static_cast<std::size_t>(n - 1)] = round_up_to_float(worst);
-    for (std::size_t g = 1; g < static_cast<std::size_t>(n); ++g) own.error_n[g] = std::max(own.error_n[g], own.error_n[g - 1]);
+    for (std::size_t g = 1; g < static_cast<std::size_t>(n); ++g)
+        own.error_n[g] = std::max(own.error_n[g], own.error_n[g - 1]);
     stored_.emplace(id, std::move(tile));
     return true;
 }
@@ -120,10 +147,11 @@ std::int32_t SyntheticTerrain::index(TileId id) const {
 
 TextureTile SyntheticTerrain::texture(TileId id) const {
     TextureTile texture;
-    texture.child_mask = id.level < dataset_.texture_deepest_level ? tile(id)->header.child_mask : std::uint8_t{0};
+    for (int q = 0; q < 4; ++q)
+        if (has_texture(child_of(id, q))) texture.child_mask = static_cast<std::uint8_t>(texture.child_mask | 1 << q);
     texture.blocks.assign(bc1_chain_bytes(dataset_.texture_size_log2), 0);
     // The tile's own index, so that a slot's content says whose it is.
-    for (std::size_t k = 0; k < 4; ++k) texture.blocks[k] = static_cast<std::uint8_t>(index(id) >> (8 * k));
+    for (std::size_t k = 0; k < 4; ++k) texture.blocks[k] = static_cast<std::uint8_t>(texture_index(id) >> (8 * k));
     return texture;
 }
 
@@ -162,7 +190,8 @@ PresenceFunction with_absent_discs(Random& random, const TerrainShape& shape, in
     std::vector<Disc> all;
     const int x = static_cast<int>(shape.cells_x), y = static_cast<int>(shape.cells_y);
     for (int k = 0; k < discs; ++k)
-        all.push_back({uniform(random, 0, x), uniform(random, 0, y), uniform(random, 1, std::max(2, std::min(x, y) / 3))});
+        all.push_back(
+            {uniform(random, 0, x), uniform(random, 0, y), uniform(random, 1, std::max(2, std::min(x, y) / 3))});
     return [all](std::int64_t i, std::int64_t j) {
         return std::none_of(all.begin(), all.end(), [&](const Disc& d) {
             return (i - d.i) * (i - d.i) + (j - d.j) * (j - d.j) < std::int64_t{d.radius} * d.radius;
@@ -202,21 +231,21 @@ Camera random_camera(Random& random, const SyntheticTerrain& terrain) {
     const double ground = terrain.dataset().max_height_m, extent = l.spacing_m * static_cast<double>(l.cells_x);
     const glm::dvec3 eye = at(uniform_real(random, -margin, 1 + margin), uniform_real(random, -margin, 1 + margin),
                               ground + extent * std::exp(uniform_real(random, -8, 1.5)) - uniform(random, 0, 3) * 5);
-    const glm::dvec3 look = at(uniform_real(random, 0, 1), uniform_real(random, 0, 1), uniform_real(random, ground - 100, ground));
-    auto camera = look_at(eye, look, uniform_real(random, 5, 120), uniform(random, 50, 2000), uniform(random, 50, 2000));
+    const glm::dvec3 look =
+        at(uniform_real(random, 0, 1), uniform_real(random, 0, 1), uniform_real(random, ground - 100, ground));
+    auto camera =
+        look_at(eye, look, uniform_real(random, 5, 120), uniform(random, 50, 2000), uniform(random, 50, 2000));
     EXPECT_TRUE(camera.ok());
     return *camera;
 }
 
 void FakeResidency::add_all() {
-    for (const TileId id : terrain_.tiles()) {
-        heights_.insert(id);
-        if (terrain_.has_texture(id)) textures_.insert(id);
-    }
+    heights_.insert(terrain_->tiles().begin(), terrain_->tiles().end());
+    textures_.insert(terrain_->textures().begin(), terrain_->textures().end());
 }
 
 void FakeResidency::add_roots() {
-    for (const TileId id : terrain_.tiles())
+    for (const TileId id : terrain_->tiles())
         if (id.level == 0) {
             heights_.insert(id);
             textures_.insert(id);
@@ -225,17 +254,23 @@ void FakeResidency::add_roots() {
 
 void FakeResidency::add_random(Random& random, int percent) {
     add_roots();
-    for (const TileId id : terrain_.tiles()) {
+    for (const TileId id : terrain_->tiles())
         if (uniform(random, 0, 99) < percent) heights_.insert(id);
-        if (terrain_.has_texture(id) && uniform(random, 0, 99) < percent) textures_.insert(id);
-    }
+    for (const TileId id : terrain_->textures())
+        if (uniform(random, 0, 99) < percent) textures_.insert(id);
 }
 
 ResidentHeight FakeResidency::height(TileId id) const {
     if (!heights_.contains(id)) return {};
-    return {&terrain_.tile(id)->header, terrain_.index(id)};
+    return {&terrain_->tile(id)->header, terrain_->index(id)};
 }
 
-std::int32_t FakeResidency::texture(TileId id) const { return textures_.contains(id) ? terrain_.index(id) : -1; }
+std::int32_t FakeResidency::texture(TileId id) const {
+    return textures_.contains(id) ? terrain_->texture_index(id) : -1;
+}
+
+std::uint8_t FakeResidency::texture_children(TileId id) const {
+    return textures_.contains(id) ? terrain_->texture(id).child_mask : std::uint8_t{0};
+}
 
 }  // namespace scree::test

@@ -14,7 +14,7 @@ TEST(Views, EachListIsWhatTheViewMaySeeOfOneCommonBalancedCut) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());
     std::int64_t shared = 0, only_one = 0;
-    for (int world = 0; world < 12; ++world) {
+    for (int world = 0; world < 40; ++world) {
         const auto terrain = test::random_terrain(random, world % 2);
         Selector selector(terrain.dataset());
         for (int k = 0; k < 12; ++k) {
@@ -22,7 +22,8 @@ TEST(Views, EachListIsWhatTheViewMaySeeOfOneCommonBalancedCut) {
             residency.add_random(random, k % 2 == 0 ? 100 : 70);
             std::vector<Camera> views;
             for (int v = 0; v <= 1 + k % 3; ++v) views.push_back(test::random_camera(random, terrain));
-            const Selection& s = selector.select(views, test::with_tau(std::exp(test::uniform_real(random, -3, 4))), residency);
+            const Selection& s =
+                selector.select(views, test::with_tau(std::exp(test::uniform_real(random, -3, 4))), residency);
             ASSERT_EQ(s.draws.size(), views.size());
             std::map<TileId, DrawItem> common;
             std::map<TileId, std::size_t> seen_by;
@@ -61,7 +62,7 @@ TEST(Views, EachListIsWhatTheViewMaySeeOfOneCommonBalancedCut) {
 TEST(Views, EachViewMeetsTheTolerance) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());
-    for (int world = 0; world < 8; ++world) {
+    for (int world = 0; world < 40; ++world) {
         const auto terrain = test::random_terrain(random);
         test::FakeResidency residency(terrain);
         residency.add_all();
@@ -71,7 +72,8 @@ TEST(Views, EachViewMeetsTheTolerance) {
             const double tau = std::exp(test::uniform_real(random, -3, 4));
             const Selection& s = selector.select(views, test::with_tau(tau), residency);
             for (std::size_t v = 0; v < views.size(); ++v)
-                for (const DrawItem& item : s.draws[v]) ASSERT_LE(test::bound_px(terrain, views[v], item), tau * (1 + 1e-12));
+                for (const DrawItem& item : s.draws[v])
+                    ASSERT_LE(test::bound_px(terrain, views[v], item), tau * (1 + 1e-12));
         }
     }
 }
@@ -79,7 +81,7 @@ TEST(Views, EachViewMeetsTheTolerance) {
 TEST(Views, ASecondIdenticalViewChangesNothing) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());
-    for (int world = 0; world < 8; ++world) {
+    for (int world = 0; world < 40; ++world) {
         const auto terrain = test::random_terrain(random, 2);
         Selector selector(terrain.dataset());
         for (int k = 0; k < 12; ++k) {
@@ -94,6 +96,7 @@ TEST(Views, ASecondIdenticalViewChangesNothing) {
             ASSERT_TRUE(test::same_draws(two.draws[0], two.draws[1]));
             ASSERT_EQ(two.triangles, 2 * one.triangles);
             two.draws.pop_back();
+            if (!two.parts.empty()) two.parts.pop_back();
             two.triangles = one.triangles;
             ASSERT_TRUE(test::same_selection(one, two));
         }

@@ -1,0 +1,257 @@
+// The mesh that `shot --mesh` writes, judged without the project's own code: cracks, heights and errors in pixels.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <map>
+#include <numbers>
+#include <sstream>
+
+#include "tests/common/test_support.h"
+#include "tests/programs/reports.h"
+#include "tests/programs/sample_inputs.h"
+
+namespace scree::test {
+namespace {
+
+using Vec3 = std::array<double, 3>;
+Vec3 operator-(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+Vec3 cross(const Vec3& a, const Vec3& b) {
+    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+Vec3 unit(const Vec3& a) {
+    const double length = std::sqrt(dot(a, a));
+    return {a[0] / length, a[1] / length, a[2] / length};
+}
+
+struct Mesh {
+    std::vector<Vec3> vertices;
+    std::vector<std::array<std::int32_t, 3>> triangles;
+};
+
+Mesh read_ply(const std::string& path) {
+    Mesh mesh;
+    const auto bytes = read_bytes(path);
+    const std::string text(bytes.begin(), bytes.end());
+    const std::size_t body = text.find("end_header\n");
+    EXPECT_NE(body, std::string::npos);
+    if (body == std::string::npos) return mesh;
+    std::istringstream header(text.substr(0, body));
+    std::size_t vertex_count = 0, face_count = 0;
+    for (std::string word; header >> word;)
+        if (word == "element") {
+            std::size_t count = 0;
+            header >> word >> count;
+            (word == "vertex" ? vertex_count : face_count) = count;
+        }
+    const std::uint8_t* at = bytes.data() + body + 11;
+    EXPECT_EQ(bytes.size(), body + 11 + vertex_count * 24 + face_count * 13);
+    if (bytes.size() != body + 11 + vertex_count * 24 + face_count * 13) return mesh;
+    mesh.vertices.resize(vertex_count);
+    std::memcpy(mesh.vertices.data(), at, vertex_count * 24);
+    at += vertex_count * 24;
+    for (std::size_t k = 0; k < face_count; ++k, at += 13) {
+        EXPECT_EQ(at[0], 3);
+        std::array<std::int32_t, 3> corners{};
+        std::memcpy(corners.data(), at + 1, 12);
+        mesh.triangles.push_back(corners);
+    }
+    return mesh;
+}
+
+// A pinhole camera from the contract's words: vertical field of view in degrees, z up, square pixels.
+struct Pinhole {
+    Vec3 eye, right, up, forward;
+    double focal = 1, half_width = 1, half_height = 1;
+    Pinhole(const Vec3& e, const Vec3& look, double fov_deg, int width, int height) : eye(e) {
+        forward = unit(look - eye);
+        right = unit(cross(forward, {0, 0, 1}));
+        up = cross(right, forward);
+        focal = height / 2.0 / std::tan(fov_deg * std::numbers::pi / 360);
+        half_width = width / 2.0;
+        half_height = height / 2.0;
+    }
+    // False when not in the picture.
+    bool project(const Vec3& p, double& x, double& y) const {
+        const Vec3 v = p - eye;
+        const double depth = dot(v, forward);
+        if (depth <= 0.1) return false;
+        x = focal * dot(v, right) / depth;
+        y = focal * dot(v, up) / depth;
+        return std::abs(x) <= half_width && std::abs(y) <= half_height;
+    }
+};
+
+std::string number(double v) {
+    std::ostringstream out;
+    out.precision(17);
+    out << v;
+    return out.str();
+}
+std::string point(const Vec3& p) { return number(p[0]) + "," + number(p[1]) + "," + number(p[2]); }
+
+class DrawnMeshFile : public ::testing::Test {
+protected:
+    static constexpr int kWidth = 300, kHeight = 220;
+    void SetUp() override {
+        for (int j = 60; j < 90; ++j)
+            for (int i = 100; i < 150; ++i) grid_.at(i, j) = 0;
+        write_heights_u16(folder_.file("d.tif"), grid_, &place_, "0");
+        build_store_from({folder_.file("d.tif"), "--tile-size", "17", "--texture-size", "16"}, folder_.file("d.scree"));
+    }
+    bool present(int i, int j) const {
+        return i >= 0 && j >= 0 && i + 1 < kWidth && j + 1 < kHeight && grid_.at(i, j) != 0 &&
+               grid_.at(i + 1, j) != 0 && grid_.at(i, j + 1) != 0 && grid_.at(i + 1, j + 1) != 0;
+    }
+    Vec3 sample(int i, int j) const { return {place_.x + i * place_.step, place_.y - j * place_.step, grid_.at(i, j)}; }
+
+    void check(const Vec3& eye, const Vec3& look, double tau, const std::string& budget);
+
+    TemporaryFolder folder_;
+    Place place_{352000, 2778000, 25, 3826};
+    HeightGrid grid_ = hills(kWidth, kHeight, 21, 250);
+};
+
+void DrawnMeshFile::check(const Vec3& eye, const Vec3& look, double tau, const std::string& budget) {
+    SCOPED_TRACE("from " + point(eye) + " at tau " + number(tau));
+    const std::string ply = folder_.file("m.ply");
+    const auto run = scree_view({"shot", folder_.file("d.scree"), "-o", folder_.file("m.png"), "--mesh", ply, "--eye",
+                                 point(eye), "--look", point(look), "--tau", number(tau), "--size", "400x300",
+                                 "--budget", budget, "--json", "-"});
+    const auto report = report_of(run);
+    const double promised = std::max(tau, report.value("max_bound_px", 1e9));
+    const Mesh mesh = read_ply(ply);
+    ASSERT_FALSE(mesh.triangles.empty());
+    EXPECT_EQ(mesh.triangles.size(), report.value("triangles", std::size_t{0}));
+
+    // Vertices stand on the lattice; those over valid samples have the source's height, to the bit.
+    std::vector<std::array<int, 2>> lattice;
+    for (const Vec3& v : mesh.vertices) {
+        const double i = (v[0] - place_.x) / place_.step, j = (place_.y - v[1]) / place_.step;
+        ASSERT_EQ(i, std::nearbyint(i));
+        ASSERT_EQ(j, std::nearbyint(j));
+        lattice.push_back({static_cast<int>(i), static_cast<int>(j)});
+        const float source = i < kWidth && j < kHeight ? grid_.at(static_cast<int>(i), static_cast<int>(j)) : 0;
+        if (source != 0) {
+            ASSERT_EQ(v[2], source) << i << ", " << j;
+        }
+    }
+
+    // Which triangle covers each quarter of a cell's middle, and the drawn height of each lattice vertex. Everything in
+    // units of a quarter cell; (2, 1) in a cell lies on no edge.
+    std::map<std::pair<int, int>, int> cover;  // cell -> triangles over its point
+    std::map<std::pair<int, int>, double> drawn;
+    std::map<std::pair<std::int32_t, std::int32_t>, int> directed;
+    for (const auto& t : mesh.triangles) {
+        const auto &a = lattice[static_cast<std::size_t>(t[0])], &b = lattice[static_cast<std::size_t>(t[1])],
+                   &c = lattice[static_cast<std::size_t>(t[2])];
+        for (std::size_t k = 0; k < 3; ++k) ++directed[{t[k], t[(k + 1) % 3]}];
+        const auto side = [](double px, double py, double qx, double qy, double x, double y) {
+            return (qx - px) * (y - py) - (qy - py) * (x - px);
+        };
+        const double area = side(a[0], a[1], b[0], b[1], c[0], c[1]);
+        ASSERT_LT(area, 0) << "not counter-clockwise from above (j runs south)";
+        for (int j = std::min({a[1], b[1], c[1]}); j <= std::max({a[1], b[1], c[1]}); ++j)
+            for (int i = std::min({a[0], b[0], c[0]}); i <= std::max({a[0], b[0], c[0]}); ++i) {
+                const auto weights = [&](double x, double y) {
+                    return Vec3{side(b[0], b[1], c[0], c[1], x, y) / area, side(c[0], c[1], a[0], a[1], x, y) / area,
+                                side(a[0], a[1], b[0], b[1], x, y) / area};
+                };
+                const Vec3 middle = weights(i + 0.5, j + 0.25);
+                if (middle[0] > 0 && middle[1] > 0 && middle[2] > 0) ++cover[{i, j}];
+                const Vec3 w = weights(i, j);
+                if (w[0] < 0 || w[1] < 0 || w[2] < 0) continue;
+                const double z = w[0] * mesh.vertices[static_cast<std::size_t>(t[0])][2] +
+                                 w[1] * mesh.vertices[static_cast<std::size_t>(t[1])][2] +
+                                 w[2] * mesh.vertices[static_cast<std::size_t>(t[2])][2];
+                const auto [known, fresh] = drawn.try_emplace({i, j}, z);
+                ASSERT_NEAR(known->second, z, 1e-6)
+                    << "two heights at " << i << ", " << j << (fresh ? " (not a number)" : "");
+            }
+    }
+    for (const auto& [cell, count] : cover)
+        ASSERT_EQ(count, 1) << "cell " << cell.first << ", " << cell.second << " is drawn twice";
+
+    // An edge is used once a direction. One used in a single direction must be the border of what is drawn.
+    std::int64_t inner = 0;
+    for (const auto& [edge, uses] : directed) {
+        ASSERT_EQ(uses, 1);
+        if (directed.contains({edge.second, edge.first})) {
+            ++inner;
+            continue;
+        }
+        const auto &a = lattice[static_cast<std::size_t>(edge.first)],
+                   &b = lattice[static_cast<std::size_t>(edge.second)];
+        // The triangle lies to its left seen from above: (dy, -dx) in (i, j). Each cell along the other side is looked
+        // at.
+        const int dx = b[0] - a[0], dy = b[1] - a[1], length = std::max(std::abs(dx), std::abs(dy));
+        ASSERT_TRUE(dx == 0 || dy == 0 || std::abs(dx) == std::abs(dy));
+        if (dx != 0 && dy != 0) {
+            ADD_FAILURE() << "a diagonal on the border, from " << a[0] << ", " << a[1];
+            continue;
+        }
+        for (int k = 0; k < length; ++k) {
+            const int outside_i = dx == 0 ? (dy > 0 ? a[0] - 1 : a[0]) : std::min(a[0], b[0]) + k;
+            const int outside_j = dx == 0 ? std::min(a[1], b[1]) + k : (dx > 0 ? a[1] : a[1] - 1);
+            ASSERT_FALSE(cover.contains({outside_i, outside_j}))
+                << "open edge " << a[0] << ", " << a[1] << " - " << b[0] << ", " << b[1] << " beside drawn cell "
+                << outside_i << ", " << outside_j;
+        }
+    }
+    EXPECT_GT(inner, 0);
+
+    // Each present cell in the picture is covered, and no vertex of one strays further than promised.
+    const Pinhole camera(eye, look, 40, 400, 300);
+    double worst_px = 0;
+    std::int64_t seen = 0;
+    for (int j = 0; j + 1 < kHeight; ++j)
+        for (int i = 0; i + 1 < kWidth; ++i) {
+            if (!present(i, j)) continue;
+            double x = 0, y = 0, shown_x = 0, shown_y = 0;
+            const Vec3 centre{
+                place_.x + (i + 0.5) * place_.step, place_.y - (j + 0.5) * place_.step,
+                (grid_.at(i, j) + grid_.at(i + 1, j) + grid_.at(i, j + 1) + grid_.at(i + 1, j + 1)) / 4.0};
+            ASSERT_TRUE(!camera.project(centre, x, y) || cover.contains({i, j})) << "hole at cell " << i << ", " << j;
+            for (const auto& [vi, vj] : {std::pair{i, j}, {i + 1, j}, {i, j + 1}, {i + 1, j + 1}}) {
+                Vec3 p = sample(vi, vj);
+                const auto z = drawn.find({vi, vj});
+                if (!camera.project(p, x, y) || z == drawn.end()) continue;
+                p[2] = z->second;
+                if (!camera.project(p, shown_x, shown_y)) continue;
+                worst_px = std::max(worst_px, std::hypot(x - shown_x, y - shown_y));
+                ++seen;
+            }
+        }
+    EXPECT_GT(seen, 100);
+    EXPECT_LE(worst_px, promised + 1e-3);
+    EXPECT_TRUE(report.value("budget_limited", false) || worst_px <= tau + 1e-3) << worst_px;
+}
+
+TEST_F(DrawnMeshFile, IsWholeAndWithinTauOfTheSource) {
+    const auto at = [&](double i, double j, double z) {
+        return Vec3{place_.x + i * place_.step, place_.y - j * place_.step, z};
+    };
+    const std::array<std::array<Vec3, 2>, 5> poses{{{at(150, 330, 4000), at(150, 110, 1000)},
+                                                    {at(20, 200, 1650), at(200, 60, 1100)},
+                                                    {at(280, 20, 1500), at(200, 120, 900)},
+                                                    {at(151, 111, 9000), at(150, 110, 1000)},
+                                                    {at(90, 75, 1700), at(130, 70, 1000)}}};
+    for (const auto& [eye, look] : poses)
+        for (const double tau : {0.5, 2.0, 8.0}) check(eye, look, tau, "64M");
+}
+
+TEST_F(DrawnMeshFile, StaysWholeUnderATinyBudget) {
+    const auto at = [&](double i, double j, double z) {
+        return Vec3{place_.x + i * place_.step, place_.y - j * place_.step, z};
+    };
+    for (const char* budget : {"700K", "1M", "2M"}) {
+        SCOPED_TRACE(budget);
+        check(at(20, 200, 1650), at(200, 60, 1100), 0.5, budget);
+        check(at(150, 330, 4000), at(150, 110, 1000), 0.5, budget);
+    }
+}
+
+}  // namespace
+}  // namespace scree::test

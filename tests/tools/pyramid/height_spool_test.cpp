@@ -1,0 +1,140 @@
+#include "tools/pyramid/height_spool.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "tests/common/test_support.h"
+
+namespace scree {
+namespace {
+
+constexpr double kVoid = std::numeric_limits<double>::quiet_NaN();
+using Rows = std::vector<std::vector<double>>;
+
+// The fill rule as its words say it, one sample at a time.
+Rows filled(const Rows& rows) {
+    Rows out = rows;
+    const auto valid = [](double v) { return !std::isnan(v); };
+    std::ptrdiff_t last = -1;
+    for (std::size_t j = 0; j < rows.size(); ++j) {
+        const auto& row = rows[j];
+        bool any = false;
+        for (std::size_t i = 0; i < row.size(); ++i) {
+            if (valid(row[i])) {
+                any = true;
+                continue;
+            }
+            std::ptrdiff_t west = static_cast<std::ptrdiff_t>(i), east = west;
+            while (west >= 0 && !valid(row[static_cast<std::size_t>(west)])) --west;
+            while (east < static_cast<std::ptrdiff_t>(row.size()) && !valid(row[static_cast<std::size_t>(east)]))
+                ++east;
+            const bool has_west = west >= 0, has_east = east < static_cast<std::ptrdiff_t>(row.size());
+            if (has_west && has_east) {
+                const double a = row[static_cast<std::size_t>(west)], b = row[static_cast<std::size_t>(east)];
+                out[j][i] = a + (b - a) * (static_cast<double>(static_cast<std::ptrdiff_t>(i) - west) /
+                                           static_cast<double>(east - west));
+            } else if (has_west || has_east) {
+                out[j][i] = row[static_cast<std::size_t>(has_west ? west : east)];
+            }
+        }
+        if (any) {
+            if (last < 0)
+                for (std::size_t above = 0; above < j; ++above) out[above] = out[j];
+            last = static_cast<std::ptrdiff_t>(j);
+        } else if (last >= 0) {
+            out[j] = out[static_cast<std::size_t>(last)];
+        }
+    }
+    return out;
+}
+
+void expect_spooled(const Rows& rows, bool wide) {
+    const test::TemporaryFolder folder;
+    const auto width = static_cast<std::int64_t>(rows[0].size()), height = static_cast<std::int64_t>(rows.size());
+    auto spool = HeightSpool::create(folder.file("heights"), width, height, wide);
+    ASSERT_TRUE(spool) << spool.error().message;
+    EXPECT_TRUE(std::filesystem::is_empty(folder.file(""))) << "the file must vanish with the process";
+    double low = INFINITY, high = -INFINITY;
+    std::int64_t count = 0;
+    for (const auto& row : rows) {
+        ASSERT_TRUE((*spool)->append(row));
+        for (const double v : row)
+            if (!std::isnan(v)) low = std::min(low, v), high = std::max(high, v), ++count;
+    }
+    auto summary = (*spool)->finish();
+    ASSERT_TRUE(summary);
+    EXPECT_EQ(summary->valid_samples, count);
+    EXPECT_EQ(summary->min_raw, low);
+    EXPECT_EQ(summary->max_raw, high);
+    const Rows expected = filled(rows);
+    std::vector<double> values(rows[0].size());
+    std::vector<std::uint8_t> valid(rows[0].size()), valid_alone(rows[0].size());
+    for (std::int64_t pass = 0; pass < 2 * height; ++pass) {  // forward, then backward
+        const std::int64_t j = pass < height ? pass : 2 * height - 1 - pass;
+        ASSERT_TRUE((*spool)->read_row(j, values, valid));
+        ASSERT_TRUE((*spool)->read_valid(j, valid_alone));
+        ASSERT_EQ(valid, valid_alone);
+        for (std::size_t i = 0; i < values.size(); ++i) {
+            const double want = expected[static_cast<std::size_t>(j)][i];
+            ASSERT_EQ(values[i], wide ? want : static_cast<double>(static_cast<float>(want)))
+                << "sample " << i << ", " << j;
+            ASSERT_EQ(valid[i] != 0, !std::isnan(rows[static_cast<std::size_t>(j)][i])) << "sample " << i << ", " << j;
+        }
+    }
+}
+
+TEST(HeightSpool, FillsRandomVoidsAsTheRuleSays) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    for (int round = 0; round < 60; ++round) {
+        const int width = test::uniform(random, 1, 40), height = test::uniform(random, 1, 30),
+                  percent = test::uniform(random, 0, 99);
+        Rows rows(static_cast<std::size_t>(height), std::vector<double>(static_cast<std::size_t>(width), kVoid));
+        for (auto& row : rows) {
+            if (test::uniform(random, 0, 3) == 0) continue;
+            for (auto& v : row)
+                if (test::uniform(random, 0, 99) >= percent) v = test::uniform(random, -1000000, 1000000) / 8.0;
+        }
+        rows[static_cast<std::size_t>(test::uniform(random, 0, height - 1))]
+            [static_cast<std::size_t>(test::uniform(random, 0, width - 1))] = 7;
+        expect_spooled(rows, round % 2 == 0);
+    }
+}
+
+TEST(HeightSpool, LeadingVoidRowsRepeatTheFirstRowThatHasOne) {
+    expect_spooled(
+        {{kVoid, kVoid, kVoid}, {kVoid, kVoid, kVoid}, {kVoid, 5, kVoid}, {kVoid, kVoid, kVoid}, {1, kVoid, 3}}, false);
+}
+
+TEST(HeightSpool, RowsLongerThanAReadAheadCome) {
+    Rows rows(3, std::vector<double>(300000, 1.5));  // a row of 1.2 MB
+    rows[1][299999] = kVoid;
+    rows[2][0] = 9;
+    expect_spooled(rows, false);
+}
+
+TEST(HeightSpool, WideValuesKeepEveryBit) { expect_spooled({{16777217, -123456789.125}, {0.1, 2147483647}}, true); }
+
+TEST(HeightSpool, NothingButVoidsIsRefused) {
+    const test::TemporaryFolder folder;
+    auto spool = HeightSpool::create(folder.file("heights"), 3, 2, false);
+    ASSERT_TRUE(spool);
+    const std::vector<double> row(3, kVoid);
+    ASSERT_TRUE((*spool)->append(row));
+    ASSERT_TRUE((*spool)->append(row));
+    auto summary = (*spool)->finish();
+    ASSERT_FALSE(summary);
+    EXPECT_EQ(summary.error().code, ErrorCode::input);
+}
+
+TEST(HeightSpool, NoPlaceToWriteIsAnIoErrorThatNamesIt) {
+    auto spool = HeightSpool::create("/no such folder/heights", 3, 2, false);
+    ASSERT_FALSE(spool);
+    EXPECT_EQ(spool.error().code, ErrorCode::io);
+    EXPECT_NE(spool.error().message.find("/no such folder/heights"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace scree
