@@ -100,12 +100,14 @@ Result<void> Dataset::check() const {
         return store_error(fmt::format("dataset: texture size 2^{} is outside 16..2048", texture_size_log2));
     if (texture_deepest_level < 0 || texture_deepest_level > kMaxLevel)
         return store_error(fmt::format("dataset: texture level {} is outside 0..30", texture_deepest_level));
-    if (!(height_quantum_error_m >= 0) || !(warp_error_m >= 0) || !finite(height_quantum_error_m) || !finite(warp_error_m))
-        return store_error(fmt::format("dataset: errors of {} m (quantum) and {} m (warp) are not lengths", height_quantum_error_m,
-                                       warp_error_m));
-    if (!tile_key(lattice, {texture_deepest_level, lattice.tiles_x(texture_deepest_level) - 1, lattice.tiles_y(texture_deepest_level) - 1}))
-        return store_error(fmt::format("dataset: texture level {} with {} roots passes the format's keys", texture_deepest_level,
-                                       lattice.root_rows * lattice.root_columns));
+    if (!(height_quantum_error_m >= 0) || !(warp_error_m >= 0) || !finite(height_quantum_error_m) ||
+        !finite(warp_error_m))
+        return store_error(fmt::format("dataset: errors of {} m (quantum) and {} m (warp) are not lengths",
+                                       height_quantum_error_m, warp_error_m));
+    if (!tile_key(lattice, {texture_deepest_level, lattice.tiles_x(texture_deepest_level) - 1,
+                            lattice.tiles_y(texture_deepest_level) - 1}))
+        return store_error(fmt::format("dataset: texture level {} with {} roots passes the format's keys",
+                                       texture_deepest_level, lattice.root_rows * lattice.root_columns));
     if (height_tiles < 1 || texture_tiles < 1 || present_cells < 1)
         return store_error("dataset: a store holds at least one tile of each kind and one present cell");
     return {};
@@ -114,7 +116,8 @@ Result<void> Dataset::check() const {
 std::string dataset_to_json(const Dataset& d) {
     Json sources = Json::array();
     for (const SourceRecord& s : d.sources)
-        sources.push_back({{"name", s.name}, {"role", s.role}, {"bytes", s.bytes}, {"width", s.width}, {"height", s.height}});
+        sources.push_back(
+            {{"name", s.name}, {"role", s.role}, {"bytes", s.bytes}, {"width", s.width}, {"height", s.height}});
     const Json json = {{"format_version", kFormatVersion},
                        {"origin_x_m", d.lattice.origin_x_m},
                        {"origin_y_m", d.lattice.origin_y_m},
@@ -153,7 +156,8 @@ Result<Dataset> dataset_from_json(const std::string& text) {
     Fields fields(json);
     fields.read("format_version", version);
     if (fields.problem().empty() && version != kFormatVersion)
-        return store_error(fmt::format("dataset: format version {}; this program reads version {}", version, kFormatVersion));
+        return store_error(
+            fmt::format("dataset: format version {}; this program reads version {}", version, kFormatVersion));
     fields.read("origin_x_m", d.lattice.origin_x_m);
     fields.read("origin_y_m", d.lattice.origin_y_m);
     fields.read("spacing_m", d.lattice.spacing_m);

@@ -1,4 +1,5 @@
-// Dataset: what a store says of itself. Stored as one JSON row (docs/store-format.md); everything read from it is checked.
+// Dataset: what a store says of itself. Stored as one JSON row (docs/store-format.md); everything read from it is
+// checked.
 #pragma once
 
 #include <cstdint>
@@ -26,7 +27,7 @@ struct Dataset {
     std::string crs_name;        ///< for people
     std::string vertical_datum;  ///< "EPSG:n" or empty
 
-    double height_offset_m = 0;         ///< z = offset + n * quantum
+    double height_offset_m = 0;  ///< z = offset + n * quantum
     double height_quantum_m = 1;
     double height_quantum_error_m = 0;  ///< 0 when every source height is a multiple of the quantum
     double warp_error_m = 0;            ///< stated apart: a store cannot see it

@@ -1,5 +1,5 @@
-// A height tile: (m+1)^2 samples as integers of the dataset's height quantum, what a renderer must know to draw or refine
-// it without reading its children, and (at the deepest level) which finest cells were valid in the source.
+// A height tile: (m+1)^2 samples as integers of the dataset's height quantum, what a renderer must know to draw or
+// refine it without reading its children, and (at the deepest level) which finest cells were valid in the source.
 #pragma once
 
 #include <array>
@@ -18,11 +18,11 @@ inline constexpr std::int32_t kMaxHeightUnits = (1 << 23) - 1;
 struct HeightBounds {
     std::int32_t min_n = 0;  ///< over every sample that can be drawn in the extent
     std::int32_t max_n = 0;
-    /// error_n[g]: maximum vertical distance between the finest stored surface over present cells and the tile's surface
-    /// drawn at geomip level g (stride 2^g samples of the tile), with any of its border vertices of ratio 2 removed.
-    /// Never falls with g; never below a child's value at the same absolute stride. g = 0 .. tile_cells_log2 - 1: a tile is
-    /// drawn with at least 2 x 2 cells. Rounded up. For the deepest level error_n[0] counts removed border vertices only:
-    /// drawn whole, the finest surface has error 0.
+    /// error_n[g]: maximum vertical distance between the finest stored surface over present cells and the tile's
+    /// surface drawn at geomip level g (stride 2^g samples of the tile), with any of its border vertices of ratio 2
+    /// removed. Never falls with g; never below a child's value at the same absolute stride. g = 0 .. tile_cells_log2 -
+    /// 1: a tile is drawn with at least 2 x 2 cells. Rounded up. For the deepest level error_n[0] counts removed border
+    /// vertices only: drawn whole, the finest surface has error 0.
     std::array<float, kMaxTileCellsLog2> error_n{};
 
     friend bool operator==(const HeightBounds&, const HeightBounds&) = default;

@@ -38,17 +38,19 @@ std::int64_t ceil_div(std::int64_t a, std::int64_t b) { return (a + b - 1) / b; 
 Result<void> Lattice::check() const {
     if (!std::isfinite(origin_x_m) || !std::isfinite(origin_y_m) || std::abs(origin_x_m) > 1e9 ||
         std::abs(origin_y_m) > 1e9)
-        return input_error(fmt::format("lattice origin ({}, {}) m is not a place within 1e9 m", origin_x_m, origin_y_m));
+        return input_error(
+            fmt::format("lattice origin ({}, {}) m is not a place within 1e9 m", origin_x_m, origin_y_m));
     if (!std::isfinite(spacing_m) || spacing_m < 1e-6 || spacing_m > 1e6)
         return input_error(fmt::format("lattice spacing {} m is outside 1e-6..1e6 m", spacing_m));
     if (cells_x < 1 || cells_y < 1 || cells_x > kMaxCellsPerSide || cells_y > kMaxCellsPerSide)
-        return input_error(
-            fmt::format("lattice of {} x {} cells; a side must have 1 to 2^30 cells", cells_x, cells_y));
+        return input_error(fmt::format("lattice of {} x {} cells; a side must have 1 to 2^30 cells", cells_x, cells_y));
     if (tile_cells_log2 < kMinTileCellsLog2 || tile_cells_log2 > kMaxTileCellsLog2)
-        return input_error(fmt::format("tile size {} is not 5, 9, 17, 33, 65, 129 or 257", tile_cells_log2 < 0 || tile_cells_log2 > 30 ? tile_cells_log2 : (1 << tile_cells_log2) + 1));
+        return input_error(
+            fmt::format("tile size {} is not 5, 9, 17, 33, 65, 129 or 257",
+                        tile_cells_log2 < 0 || tile_cells_log2 > 30 ? tile_cells_log2 : (1 << tile_cells_log2) + 1));
     if (deepest_level < 0 || deepest_level > kMaxLevel || deepest_level + tile_cells_log2 > 30)
-        return input_error(fmt::format("deepest level {} with {} cells a tile passes 2^30 cells a side", deepest_level,
-                                       tile_cells()));
+        return input_error(
+            fmt::format("deepest level {} with {} cells a tile passes 2^30 cells a side", deepest_level, tile_cells()));
     if (root_rows < 1 || root_columns < 1 || root_rows > kMaxRoots || root_columns > kMaxRoots ||
         root_rows * root_columns > kMaxRoots)
         return input_error(fmt::format("{} x {} roots; at most {} are allowed", root_rows, root_columns, kMaxRoots));
@@ -89,8 +91,7 @@ std::optional<std::int64_t> tile_key(const Lattice& lattice, TileId id) {
                         (spread_bits(static_cast<std::uint64_t>(id.y & mask)) << 1);
     const std::uint64_t prefix = (std::uint64_t{1} << (2 * id.level)) | morton;
     const auto roots = static_cast<std::uint64_t>(lattice.root_rows * lattice.root_columns);
-    const auto root =
-        static_cast<std::uint64_t>((id.y >> id.level) * lattice.root_columns + (id.x >> id.level));
+    const auto root = static_cast<std::uint64_t>((id.y >> id.level) * lattice.root_columns + (id.x >> id.level));
     std::uint64_t key = 0;
     if (__builtin_mul_overflow(prefix, roots, &key) || __builtin_add_overflow(key, root, &key) || (key >> 63) != 0)
         return std::nullopt;

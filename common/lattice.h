@@ -1,6 +1,6 @@
-// Lattice: the one grid of square cells that every tile, mesh and query of a dataset speaks of (docs/architecture.md, "One
-// lattice"). i counts cells east, j counts cells south from the north-west sample; level l holds every 2^(L-l)-th sample.
-// All values are checked by make_lattice / Lattice::check: arithmetic on a checked lattice cannot overflow.
+// Lattice: the one grid of square cells that every tile, mesh and query of a dataset speaks of (docs/architecture.md,
+// "One lattice"). i counts cells east, j counts cells south from the north-west sample; level l holds every 2^(L-l)-th
+// sample. All values are checked by make_lattice / Lattice::check: arithmetic on a checked lattice cannot overflow.
 #pragma once
 
 #include <cstdint>
@@ -32,10 +32,10 @@ struct Lattice {
     double origin_x_m = 0;  ///< x of sample (0, 0), the north-west one
     double origin_y_m = 0;
     double spacing_m = 1;
-    std::int64_t cells_x = 0;  ///< cells of the data's extent, east (samples - 1)
-    std::int64_t cells_y = 0;  ///< cells of the data's extent, south
-    int deepest_level = 0;     ///< L of the height pyramid
-    int tile_cells_log2 = 5;   ///< n; a tile has (2^n + 1)^2 samples
+    std::int64_t cells_x = 0;       ///< cells of the data's extent, east (samples - 1)
+    std::int64_t cells_y = 0;       ///< cells of the data's extent, south
+    int deepest_level = 0;          ///< L of the height pyramid
+    int tile_cells_log2 = 5;        ///< n; a tile has (2^n + 1)^2 samples
     std::int64_t root_rows = 1;     ///< M
     std::int64_t root_columns = 1;  ///< N
 
@@ -65,8 +65,8 @@ struct Lattice {
     friend bool operator==(const Lattice&, const Lattice&) = default;
 };
 
-/// The lattice over cells_x x cells_y cells: as few roots as the shape allows, min(M, N) = 1 unless that would take more
-/// than kMaxRoots. Errors: ErrorCode::input for extents beyond the format.
+/// The lattice over cells_x x cells_y cells: as few roots as the shape allows, min(M, N) = 1 unless that would take
+/// more than kMaxRoots. Errors: ErrorCode::input for extents beyond the format.
 Result<Lattice> make_lattice(double origin_x_m, double origin_y_m, double spacing_m, std::int64_t cells_x,
                              std::int64_t cells_y, int tile_cells_log2);
 

@@ -6,7 +6,7 @@
 namespace scree {
 
 struct ProcessUsage {
-    double cpu_seconds = 0;            ///< user + system
+    double cpu_seconds = 0;  ///< user + system
     std::int64_t peak_rss_bytes = 0;
 };
 

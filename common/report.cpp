@@ -1,7 +1,7 @@
 #include "common/report.h"
 
-#include <fmt/format.h>
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -48,7 +48,8 @@ Result<void> write_text(const std::string& file, const std::string& text) {
         return {};
     }
     struct stat status {};
-    if (::stat(file.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {  // a device or a pipe takes text, not a new name
+    if (::stat(file.c_str(), &status) == 0 &&
+        !S_ISREG(status.st_mode)) {  // a device or a pipe takes text, not a new name
         std::FILE* device = S_ISDIR(status.st_mode) ? nullptr : std::fopen(file.c_str(), "wb");
         const bool written = device != nullptr && std::fwrite(text.data(), 1, text.size(), device) == text.size();
         if (device == nullptr || std::fclose(device) != 0 || !written)
@@ -77,10 +78,14 @@ std::optional<std::int64_t> parse_bytes(const std::string& text) {
     if (suffix.size() == 3 && suffix.substr(1) == "iB") suffix.resize(1);
     if (suffix.size() == 2 && suffix[1] == 'B') suffix.resize(1);
     double unit = 1;
-    if (suffix == "K" || suffix == "k") unit = 1024;
-    else if (suffix == "M" || suffix == "m") unit = 1024.0 * 1024;
-    else if (suffix == "G" || suffix == "g") unit = 1024.0 * 1024 * 1024;
-    else if (!suffix.empty()) return std::nullopt;
+    if (suffix == "K" || suffix == "k")
+        unit = 1024;
+    else if (suffix == "M" || suffix == "m")
+        unit = 1024.0 * 1024;
+    else if (suffix == "G" || suffix == "g")
+        unit = 1024.0 * 1024 * 1024;
+    else if (!suffix.empty())
+        return std::nullopt;
     if (value * unit > 1e15) return std::nullopt;
     return static_cast<std::int64_t>(value * unit);
 }

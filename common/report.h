@@ -20,8 +20,8 @@ void note(fmt::format_string<Args...> text, Args&&... args) {
     (void)!std::fwrite(line.data(), 1, line.size(), stderr);
 }
 
-/// At the start of a program: descriptors 0 to 2 that are closed are opened on /dev/null, lest a file of ours takes their
-/// number and messages end up in it.
+/// At the start of a program: descriptors 0 to 2 that are closed are opened on /dev/null, lest a file of ours takes
+/// their number and messages end up in it.
 void guard_standard_descriptors();
 
 /// At the end of a program: its exit code, or 5 when standard output did not take all that was written to it.

@@ -1,5 +1,5 @@
-// Result<T>: how every module reports bad input. Nothing throws across a module's edge; an Error carries the exit code of
-// the program that meets it and a message that names the file, the value found and what follows from it.
+// Result<T>: how every module reports bad input. Nothing throws across a module's edge; an Error carries the exit code
+// of the program that meets it and a message that names the file, the value found and what follows from it.
 #pragma once
 
 #include <cassert>

@@ -1,6 +1,6 @@
-// A texture tile: a square BC1 image of `texture_size` texels with its mip chain, covering the extent of the height tile of
-// the same address. Alpha 0 means "no heights here"; transparent texels decode to black, so a filtered colour is divided
-// by its filtered alpha.
+// A texture tile: a square BC1 image of `texture_size` texels with its mip chain, covering the extent of the height
+// tile of the same address. Alpha 0 means "no heights here"; transparent texels decode to black, so a filtered colour
+// is divided by its filtered alpha.
 #pragma once
 
 #include <cstddef>

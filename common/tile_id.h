@@ -1,5 +1,5 @@
-// TileId: the address of a tile in a pyramid. Level 0 is the coarsest (the roots). x counts tiles from the west, y from the
-// north, over all roots of the level: the root of a tile is (x >> level, y >> level).
+// TileId: the address of a tile in a pyramid. Level 0 is the coarsest (the roots). x counts tiles from the west, y from
+// the north, over all roots of the level: the root of a tile is (x >> level, y >> level).
 #pragma once
 
 #include <compare>

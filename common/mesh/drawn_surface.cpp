@@ -7,9 +7,9 @@
 namespace scree {
 namespace {
 
-// In a block of 2 x 2 cells round its centre, with a = max(|dx|, |dy|), b = min(|dx|, |dy|) in strides, the point lies in the
-// triangle (centre, mid-point of the nearer side, corner) and z = (1 - a) z_centre + (a - b) z_mid + b z_corner. A thinned
-// side's mid-point stands at the mean of its two corners.
+// In a block of 2 x 2 cells round its centre, with a = max(|dx|, |dy|), b = min(|dx|, |dy|) in strides, the point lies
+// in the triangle (centre, mid-point of the nearer side, corner) and z = (1 - a) z_centre + (a - b) z_mid + b z_corner.
+// A thinned side's mid-point stands at the mean of its two corners.
 struct Fan {
     std::int64_t centre, corner;
     std::int64_t twice_mid;  // doubled, so that a thinned side's mean stays an integer
@@ -41,8 +41,8 @@ Fan fan_at(std::span<const std::int32_t> samples, int n, DrawnPattern pattern, i
 
 }  // namespace
 
-ExactHeight drawn_height(std::span<const std::int32_t> samples, int tile_cells_log2, DrawnPattern pattern, std::int64_t u,
-                         std::int64_t v, std::int64_t unit) {
+ExactHeight drawn_height(std::span<const std::int32_t> samples, int tile_cells_log2, DrawnPattern pattern,
+                         std::int64_t u, std::int64_t v, std::int64_t unit) {
     const std::int64_t m = std::int64_t{1} << tile_cells_log2;
     assert(static_cast<std::int64_t>(samples.size()) == (m + 1) * (m + 1));
     assert(u >= 0 && v >= 0 && u <= m * unit && v <= m * unit);
@@ -53,8 +53,8 @@ ExactHeight drawn_height(std::span<const std::int32_t> samples, int tile_cells_l
     const std::int64_t dx = u - (2 * bi + 1) * stride;
     const std::int64_t dy = v - (2 * bj + 1) * stride;
     const std::int64_t ax = std::abs(dx), ay = std::abs(dy);
-    const Fan fan = fan_at(samples, tile_cells_log2, pattern, static_cast<int>(bi), static_cast<int>(bj), dx > 0, dy > 0,
-                           ax >= ay);
+    const Fan fan =
+        fan_at(samples, tile_cells_log2, pattern, static_cast<int>(bi), static_cast<int>(bj), dx > 0, dy > 0, ax >= ay);
     const std::int64_t a = std::max(ax, ay), b = std::min(ax, ay);
     return {2 * (stride - a) * fan.centre + (a - b) * fan.twice_mid + 2 * b * fan.corner, 2 * stride};
 }

@@ -19,8 +19,8 @@ struct Region {
 };
 
 // Greatest |denominator * z - (start + slope * k)| for k = 0..count-1.
-double row_error(const std::int32_t* z, const std::uint8_t* present, std::int64_t count, double denominator, double start,
-                 double slope) {
+double row_error(const std::int32_t* z, const std::uint8_t* present, std::int64_t count, double denominator,
+                 double start, double slope) {
     double high = 0, low = 0;
     if (present == nullptr) {
         for (std::int64_t k = 0; k < count; ++k) {
@@ -39,7 +39,8 @@ double row_error(const std::int32_t* z, const std::uint8_t* present, std::int64_
     return std::max(high, -low);
 }
 
-// Error of one block over a region, `removable` = sides whose mid-vertex may be missing. In units of 1/(2 stride) quanta.
+// Error of one block over a region, `removable` = sides whose mid-vertex may be missing. In units of 1/(2 stride)
+// quanta.
 double block_error(const BlockVertices& v, std::int64_t stride, unsigned removable, const Region& r) {
     const double s = static_cast<double>(stride);
     const double centre = v[4];
@@ -72,8 +73,8 @@ double block_error(const BlockVertices& v, std::int64_t stride, unsigned removab
                 // Slope of one step of dx inside this part, exact: d/d|dx| times the direction.
                 const double along = side_is_x ? twice_mid - 2 * centre : 2 * corner - twice_mid;
                 const double slope = east ? along : -along;
-                return row_error(z + (from - r.x0), present == nullptr ? nullptr : present + (from - r.x0), to - from + 1,
-                                 2 * s, start, slope);
+                return row_error(z + (from - r.x0), present == nullptr ? nullptr : present + (from - r.x0),
+                                 to - from + 1, 2 * s, start, slope);
             };
             worst = std::max(worst, part_error(2 * mid));
             if ((removable & side) != 0) worst = std::max(worst, part_error(corner + other));
@@ -92,7 +93,8 @@ std::vector<std::uint8_t> present_vertices(std::span<const std::uint8_t> cells, 
     for (std::size_t j = 0; j < m; ++j)
         for (std::size_t i = 0; i < m; ++i)
             if (cells[j * m + i] != 0)
-                for (const std::size_t k : {j * pitch + i, j * pitch + i + 1, (j + 1) * pitch + i, (j + 1) * pitch + i + 1})
+                for (const std::size_t k :
+                     {j * pitch + i, j * pitch + i + 1, (j + 1) * pitch + i, (j + 1) * pitch + i + 1})
                     vertices[k] = 1;
     return vertices;
 }
@@ -101,8 +103,13 @@ double coarse_block_error(const BlockVertices& block, std::int64_t stride, std::
                           const FinestVertices& finest) {
     const std::int64_t m = std::int64_t{1} << finest.tile_cells_log2;
     assert(offset_i >= 0 && offset_j >= 0 && offset_i + m <= 2 * stride && offset_j + m <= 2 * stride);
-    const Region region{offset_i - stride, offset_j - stride, offset_i - stride + m, offset_j - stride + m,
-                        finest.samples,    finest.present,    m + 1};
+    const Region region{offset_i - stride,
+                        offset_j - stride,
+                        offset_i - stride + m,
+                        offset_j - stride + m,
+                        finest.samples,
+                        finest.present,
+                        m + 1};
     const double s2 = 2 * static_cast<double>(stride);
     return block_error(block, stride, kEdgeNorth | kEdgeEast | kEdgeSouth | kEdgeWest, region) / s2;
 }
@@ -121,15 +128,21 @@ std::array<double, kMaxTileCellsLog2> leaf_errors(const FinestVertices& finest) 
                 const std::int64_t first = 2 * bj * stride * pitch + 2 * bi * stride;
                 BlockVertices v{};
                 for (std::int64_t k = 0; k < 9; ++k)
-                    v[static_cast<std::size_t>(k)] = finest.samples[first + (k / 3) * stride * pitch + (k % 3) * stride];
+                    v[static_cast<std::size_t>(k)] =
+                        finest.samples[first + (k / 3) * stride * pitch + (k % 3) * stride];
                 unsigned removable = 0;
                 if (bj == 0) removable |= kEdgeNorth;
                 if (bi == blocks - 1) removable |= kEdgeEast;
                 if (bj == blocks - 1) removable |= kEdgeSouth;
                 if (bi == 0) removable |= kEdgeWest;
                 if (g == 0 && removable == 0) continue;  // the finest surface itself
-                const Region region{-stride, -stride, stride, stride, finest.samples + first,
-                                    finest.present == nullptr ? nullptr : finest.present + first, pitch};
+                const Region region{-stride,
+                                    -stride,
+                                    stride,
+                                    stride,
+                                    finest.samples + first,
+                                    finest.present == nullptr ? nullptr : finest.present + first,
+                                    pitch};
                 worst = std::max(worst, block_error(v, stride, removable, region) / (2 * static_cast<double>(stride)));
             }
         running = std::max(running, worst);
@@ -140,7 +153,8 @@ std::array<double, kMaxTileCellsLog2> leaf_errors(const FinestVertices& finest) 
 
 float round_up_to_float(double value) {
     const float rounded = static_cast<float>(value);
-    return static_cast<double>(rounded) < value ? std::nextafter(rounded, std::numeric_limits<float>::infinity()) : rounded;
+    return static_cast<double>(rounded) < value ? std::nextafter(rounded, std::numeric_limits<float>::infinity())
+                                                : rounded;
 }
 
 }  // namespace scree

@@ -1,9 +1,9 @@
 // Certified geometric error: the exact maximum vertical distance between a surface that a tile can draw and the finest
-// surface, over present cells. Because every coarse edge is a union of finest edges (nested union jack; Scree lod, C11), the
-// maximum lies at finest vertices. All arithmetic is exact: integers in doubles below 2^53.
+// surface, over present cells. Because every coarse edge is a union of finest edges (nested union jack; Scree lod,
+// C11), the maximum lies at finest vertices. All arithmetic is exact: integers in doubles below 2^53.
 //
-// A tile's surface at any stride is a set of blocks of 2 x 2 cells. A parent's surface at a stride its children can draw is
-// theirs, so only each tile's coarsest surface, one block, is ever compared with the finest data.
+// A tile's surface at any stride is a set of blocks of 2 x 2 cells. A parent's surface at a stride its children can
+// draw is theirs, so only each tile's coarsest surface, one block, is ever compared with the finest data.
 #pragma once
 
 #include <array>
@@ -34,8 +34,8 @@ using BlockVertices = std::array<std::int32_t, 9>;
 double coarse_block_error(const BlockVertices& block, std::int64_t stride, std::int64_t offset_i, std::int64_t offset_j,
                           const FinestVertices& finest);
 
-/// Errors of a deepest-level tile against itself at geomip levels 0..n-1 with all thinned variants, in quanta, saturated
-/// (never falling with the level).
+/// Errors of a deepest-level tile against itself at geomip levels 0..n-1 with all thinned variants, in quanta,
+/// saturated (never falling with the level).
 std::array<double, kMaxTileCellsLog2> leaf_errors(const FinestVertices& finest);
 
 /// The smallest float not below `value` >= 0.

@@ -1,8 +1,8 @@
-// Index lists of a tile's mesh for every geomip level and edge mask. Source: the nested union jack (docs/architecture.md,
-// "One triangulation"): cell (i, j) of a stride is split by the diagonal (i,j)-(i+1,j+1) iff i + j is even. With at least
-// 2 x 2 cells a tile is a set of blocks of 2 x 2 cells, each a fan of 8 triangles round its centre. Thinning an edge by 2
-// removes the mid-vertex of each block's side on that edge and merges its two triangles: the bisection hierarchy of Ueng &
-// Chuang and the omitted vertices of de Boer (section 2.4) at once.
+// Index lists of a tile's mesh for every geomip level and edge mask. Source: the nested union jack
+// (docs/architecture.md, "One triangulation"): cell (i, j) of a stride is split by the diagonal (i,j)-(i+1,j+1) iff i +
+// j is even. With at least 2 x 2 cells a tile is a set of blocks of 2 x 2 cells, each a fan of 8 triangles round its
+// centre. Thinning an edge by 2 removes the mid-vertex of each block's side on that edge and merges its two triangles:
+// the bisection hierarchy of Ueng & Chuang and the omitted vertices of de Boer (section 2.4) at once.
 #pragma once
 
 #include <cstdint>
@@ -36,8 +36,8 @@ public:
     int geomip_levels() const { return tile_cells_log2_; }
     /// Pattern of geomip level g (stride 2^g), 0 <= g < geomip_levels(), with the edges in `mask` thinned by 2.
     PatternRange range(int geomip, unsigned mask) const { return range(geomip, mask, TilePart{}); }
-    /// The indices of a part only: blocks stand in Morton order, so a part is one range. A part holds at least one block:
-    /// part.level <= finest_part_level(geomip).
+    /// The indices of a part only: blocks stand in Morton order, so a part is one range. A part holds at least one
+    /// block: part.level <= finest_part_level(geomip).
     PatternRange range(int geomip, unsigned mask, TilePart part) const;
     int finest_part_level(int geomip) const { return tile_cells_log2_ - 1 - geomip; }
     const std::vector<std::uint32_t>& indices() const { return indices_; }

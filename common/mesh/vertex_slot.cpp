@@ -8,8 +8,8 @@
 namespace scree {
 namespace {
 
-// A vertex first appears at geomip level k = the number of factors two its coordinates share; it is drawn up to level k and
-// lies on the mid-point of an edge or diagonal of level k + 1.
+// A vertex first appears at geomip level k = the number of factors two its coordinates share; it is drawn up to level k
+// and lies on the mid-point of an edge or diagonal of level k + 1.
 int birth_level(int i, int j, int deepest) {
     int level = 0;
     while (level < deepest && ((i | j) & 1) == 0) {

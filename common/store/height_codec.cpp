@@ -20,9 +20,7 @@ Error bad(std::string what) { return {ErrorCode::store, "height tile: " + std::m
 std::uint32_t zigzag(std::int32_t v) {
     return (static_cast<std::uint32_t>(v) << 1) ^ static_cast<std::uint32_t>(v >> 31);
 }
-std::int32_t unzigzag(std::uint32_t v) {
-    return static_cast<std::int32_t>((v >> 1) ^ (~(v & 1) + 1));
-}
+std::int32_t unzigzag(std::uint32_t v) { return static_cast<std::int32_t>((v >> 1) ^ (~(v & 1) + 1)); }
 
 void write_bounds(ByteWriter& out, const HeightBounds& bounds, int levels) {
     out.i32(bounds.min_n);
@@ -120,8 +118,8 @@ std::vector<std::uint8_t> encode_height_tile(const HeightTile& tile, int n, Heig
     append_presence(plain, tile.presence);
 
     std::vector<std::uint8_t> packed(ZSTD_compressBound(plain.size()));
-    const std::size_t size = ZSTD_compressCCtx(zstd_contexts().compress.get(), packed.data(), packed.size(), plain.data(),
-                                               plain.size(), 1);
+    const std::size_t size =
+        ZSTD_compressCCtx(zstd_contexts().compress.get(), packed.data(), packed.size(), plain.data(), plain.size(), 1);
     assert(ZSTD_isError(size) == 0);
     out.u8(static_cast<std::uint8_t>(planes));
     out.bytes({packed.data(), size});

@@ -52,25 +52,10 @@ int file_sector_size(sqlite3_file* f) { return inner(f)->pMethods->xSectorSize(i
 int file_characteristics(sqlite3_file* f) { return inner(f)->pMethods->xDeviceCharacteristics(inner(f)); }
 
 // Version 1 methods: no shared memory (no WAL) and no memory map, both of which would pass the checksum by.
-const sqlite3_io_methods kMethods = {1,
-                                     file_close,
-                                     file_read,
-                                     file_write,
-                                     file_truncate,
-                                     file_sync,
-                                     file_size,
-                                     file_lock,
-                                     file_unlock,
-                                     file_check_lock,
-                                     file_control,
-                                     file_sector_size,
-                                     file_characteristics,
-                                     nullptr,
-                                     nullptr,
-                                     nullptr,
-                                     nullptr,
-                                     nullptr,
-                                     nullptr};
+const sqlite3_io_methods kMethods = {
+    1,           file_close,      file_read,    file_write,       file_truncate,        file_sync, file_size, file_lock,
+    file_unlock, file_check_lock, file_control, file_sector_size, file_characteristics, nullptr,   nullptr,   nullptr,
+    nullptr,     nullptr,         nullptr};
 
 int vfs_open(sqlite3_vfs* v, const char* name, sqlite3_file* f, int flags, int* out_flags) {
     ChecksumFile* file = new (f) ChecksumFile{};
@@ -98,7 +83,9 @@ Result<void> register_page_checksum_vfs() {
     vfs.szOsFile = static_cast<int>(sizeof(ChecksumFile)) + base->szOsFile;
     vfs.xOpen = vfs_open;
     vfs.xDelete = [](sqlite3_vfs* v, const char* n, int s) { return base_vfs(v)->xDelete(base_vfs(v), n, s); };
-    vfs.xAccess = [](sqlite3_vfs* v, const char* n, int f, int* o) { return base_vfs(v)->xAccess(base_vfs(v), n, f, o); };
+    vfs.xAccess = [](sqlite3_vfs* v, const char* n, int f, int* o) {
+        return base_vfs(v)->xAccess(base_vfs(v), n, f, o);
+    };
     vfs.xFullPathname = [](sqlite3_vfs* v, const char* n, int c, char* o) {
         return base_vfs(v)->xFullPathname(base_vfs(v), n, c, o);
     };
@@ -109,7 +96,8 @@ Result<void> register_page_checksum_vfs() {
         return base_vfs(v)->xCurrentTimeInt64(base_vfs(v), t);
     };
     vfs.xGetLastError = [](sqlite3_vfs* v, int n, char* o) { return base_vfs(v)->xGetLastError(base_vfs(v), n, o); };
-    if (sqlite3_vfs_register(&vfs, 0) != SQLITE_OK) return Error{ErrorCode::io, "SQLite refused the checksum file layer"};
+    if (sqlite3_vfs_register(&vfs, 0) != SQLITE_OK)
+        return Error{ErrorCode::io, "SQLite refused the checksum file layer"};
     registered = true;
     return {};
 }
@@ -122,14 +110,14 @@ Result<PageScan> scan_page_checksums(const std::string& path) {
     const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), std::fclose);
     if (!file) return Error{ErrorCode::io, fmt::format("{}: {}", path, std::strerror(errno))};
     std::uint8_t header[100];
-    if (std::fread(header, 1, sizeof header, file.get()) != sizeof header || std::memcmp(header, "SQLite format 3", 16) != 0)
+    if (std::fread(header, 1, sizeof header, file.get()) != sizeof header ||
+        std::memcmp(header, "SQLite format 3", 16) != 0)
         return Error{ErrorCode::store, fmt::format("{}: not a SQLite database", path)};
     std::size_t page_size = static_cast<std::size_t>(header[16]) << 8 | header[17];
     if (page_size == 1) page_size = 65536;
     if (!is_page(static_cast<int>(page_size)) || header[20] != kPageChecksumBytes)
-        return Error{ErrorCode::store,
-                     fmt::format("{}: pages of {} bytes with {} reserved; a store reserves {}", path, page_size,
-                                 int{header[20]}, kPageChecksumBytes)};
+        return Error{ErrorCode::store, fmt::format("{}: pages of {} bytes with {} reserved; a store reserves {}", path,
+                                                   page_size, int{header[20]}, kPageChecksumBytes)};
     std::rewind(file.get());
     PageScan scan;
     std::vector<std::uint8_t> page(page_size);

@@ -1,5 +1,5 @@
-// A SQLite VFS that ends every page of a database with a checksum of the page, in the eight bytes a page that SQLite can be
-// told to reserve. Row checksums find damaged payloads; this finds damage anywhere in the file, b-tree included.
+// A SQLite VFS that ends every page of a database with a checksum of the page, in the eight bytes a page that SQLite
+// can be told to reserve. Row checksums find damaged payloads; this finds damage anywhere in the file, b-tree included.
 // Any SQLite reads such a file; one that writes it without this VFS leaves pages that verify reports.
 #pragma once
 
@@ -26,7 +26,8 @@ struct PageScan {
     std::vector<std::int64_t> damaged;  ///< page numbers, at most 100
 };
 
-/// Reads the file page by page. Errors: ErrorCode::io unreadable, ErrorCode::store when it is no database of this layout.
+/// Reads the file page by page. Errors: ErrorCode::io unreadable, ErrorCode::store when it is no database of this
+/// layout.
 Result<PageScan> scan_page_checksums(const std::string& path);
 
 }  // namespace scree

@@ -34,8 +34,10 @@ ErrorCode code_of(int rc) {
         case SQLITE_ERROR:
         case SQLITE_FORMAT:
         case SQLITE_MISMATCH:
-        case SQLITE_SCHEMA: return ErrorCode::store;
-        default: return ErrorCode::io;
+        case SQLITE_SCHEMA:
+            return ErrorCode::store;
+        default:
+            return ErrorCode::io;
     }
 }
 
@@ -109,7 +111,10 @@ Row row_of(sqlite3_stmt* statement, int table, std::int64_t key, int first_colum
 class SqliteTileReader final : public TileReader {
 public:
     SqliteTileReader(std::string path, Lattice lattice, Database db, Statement height, Statement texture)
-        : path_(std::move(path)), lattice_(lattice), db_(std::move(db)), statements_{std::move(height), std::move(texture)} {}
+        : path_(std::move(path)),
+          lattice_(lattice),
+          db_(std::move(db)),
+          statements_{std::move(height), std::move(texture)} {}
 
     Result<bool> read(TileKind kind, TileId id, TileRow& row) override {
         const auto key = tile_key(lattice_, id);
@@ -143,14 +148,17 @@ Result<Dataset> read_dataset(const std::string& path, sqlite3* db) {
     auto id = query_integer(path, db, "PRAGMA application_id");
     if (!id) return id.error();
     if (*id != kApplicationId)
-        return Error{ErrorCode::store, fmt::format("{}: a SQLite file, but not a Scree store (application id {})", path, *id)};
+        return Error{ErrorCode::store,
+                     fmt::format("{}: a SQLite file, but not a Scree store (application id {})", path, *id)};
     auto version = query_integer(path, db, "PRAGMA user_version");
     if (!version) return version.error();
     if (*version != kFormatVersion)
-        return Error{ErrorCode::store, fmt::format("{}: format version {}; this program reads version {}", path, *version,
-                                                   kFormatVersion)};
+        return Error{ErrorCode::store, fmt::format("{}: format version {}; this program reads version {}", path,
+                                                   *version, kFormatVersion)};
     // A view under one of the names could hold any query.
-    auto tables = query_integer(path, db, "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name IN ('dataset', 'height', 'texture')");
+    auto tables = query_integer(
+        path, db,
+        "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name IN ('dataset', 'height', 'texture')");
     if (!tables) return tables.error();
     if (*tables != 3) return Error{ErrorCode::store, fmt::format("{}: the tables of a store are missing", path)};
     auto statement = prepare(path, db, "SELECT codec, checksum, payload FROM dataset WHERE key = 1");
@@ -202,7 +210,8 @@ Result<void> SqliteStore::for_each(TileKind kind, const std::function<bool(const
     if (!db) return db.error();
     const int table = static_cast<int>(kind);
     auto statement = prepare(path_, db->get(),
-                             fmt::format("SELECT codec, checksum, payload, key FROM {} ORDER BY key", kTables[static_cast<std::size_t>(table)]));
+                             fmt::format("SELECT codec, checksum, payload, key FROM {} ORDER BY key",
+                                         kTables[static_cast<std::size_t>(table)]));
     if (!statement) return statement.error();
     for (;;) {
         const int rc = sqlite3_step(statement->get());
@@ -219,7 +228,8 @@ Result<SqliteStore::Contents> SqliteStore::contents() const {
     if (!db) return db.error();
     Contents contents;
     const auto read = [&](const char* table, std::int64_t& rows, std::int64_t& bytes) -> Result<void> {
-        auto statement = prepare(path_, db->get(), fmt::format("SELECT count(*), total(length(payload)) FROM {}", table));
+        auto statement =
+            prepare(path_, db->get(), fmt::format("SELECT count(*), total(length(payload)) FROM {}", table));
         if (!statement) return statement.error();
         const int rc = sqlite3_step(statement->get());
         if (rc != SQLITE_ROW) return sqlite_error(path_, db->get(), rc);
@@ -230,7 +240,8 @@ Result<SqliteStore::Contents> SqliteStore::contents() const {
     if (auto ok = read("height", contents.height_rows, contents.height_bytes); !ok) return ok.error();
     if (auto ok = read("texture", contents.texture_rows, contents.texture_bytes); !ok) return ok.error();
     struct stat status {};
-    if (::stat(path_.c_str(), &status) != 0) return Error{ErrorCode::io, fmt::format("{}: {}", path_, std::strerror(errno))};
+    if (::stat(path_.c_str(), &status) != 0)
+        return Error{ErrorCode::io, fmt::format("{}: {}", path_, std::strerror(errno))};
     contents.file_bytes = status.st_size;
     return contents;
 }
@@ -246,7 +257,8 @@ Result<std::string> SqliteStore::integrity_problems() const {
         if (rc == SQLITE_DONE) break;
         if (rc != SQLITE_ROW) return sqlite_error(path_, db->get(), rc);
         const auto* text = reinterpret_cast<const char*>(sqlite3_column_text(statement->get(), 0));
-        if (text != nullptr && std::strcmp(text, "ok") != 0) problems += std::string(problems.empty() ? "" : "; ") + text;
+        if (text != nullptr && std::strcmp(text, "ok") != 0)
+            problems += std::string(problems.empty() ? "" : "; ") + text;
     }
     return problems;
 }
@@ -277,7 +289,9 @@ Result<std::string> SqliteStore::digest() const {
             return !damaged;
         });
         if (!ok) return ok.error();
-        if (damaged) return Error{ErrorCode::store, fmt::format("{}: a row is damaged, so there is no digest; run scree verify", path_)};
+        if (damaged)
+            return Error{ErrorCode::store,
+                         fmt::format("{}: a row is damaged, so there is no digest; run scree verify", path_)};
     }
     std::array<unsigned char, 32> hash{};
     unsigned size = 0;
@@ -315,7 +329,8 @@ Result<std::unique_ptr<SqliteStoreWriter>> SqliteStoreWriter::create(const std::
     if (auto ok = execute(path, impl->db.get(), setup.c_str()); !ok) return ok.error();
     for (const char* table : kTables) {
         const std::string sql = fmt::format(
-            "CREATE TABLE {}(key INTEGER PRIMARY KEY, codec INTEGER NOT NULL, checksum INTEGER NOT NULL, payload BLOB NOT NULL)",
+            "CREATE TABLE {}(key INTEGER PRIMARY KEY, codec INTEGER NOT NULL, checksum INTEGER NOT NULL, payload BLOB "
+            "NOT NULL)",
             table);
         if (auto ok = execute(path, impl->db.get(), sql.c_str()); !ok) return ok.error();
     }
@@ -349,8 +364,8 @@ Result<void> SqliteStoreWriter::put(TileKind kind, std::int64_t key, int codec, 
     if (impl.rows_in_transaction == 0)
         if (auto ok = execute(impl.path, impl.db.get(), "BEGIN"); !ok) return ok;
     const int table = static_cast<int>(kind);
-    if (auto ok = insert_row(impl.path, impl.db.get(), impl.insert[static_cast<std::size_t>(table)].get(), table, key, codec,
-                             payload);
+    if (auto ok = insert_row(impl.path, impl.db.get(), impl.insert[static_cast<std::size_t>(table)].get(), table, key,
+                             codec, payload);
         !ok)
         return ok;
     if (++impl.rows_in_transaction < kRowsPerCommit) return {};

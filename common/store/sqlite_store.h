@@ -1,5 +1,5 @@
-// A store in one SQLite file (docs/store-format.md): tables dataset, height and texture of the same shape, a checksum a row,
-// a checksum a page.
+// A store in one SQLite file (docs/store-format.md): tables dataset, height and texture of the same shape, a checksum a
+// row, a checksum a page.
 #pragma once
 
 #include <functional>
@@ -11,8 +11,8 @@
 
 namespace scree {
 
-/// Opens read-only. Errors: ErrorCode::input missing or unreadable, ErrorCode::store not a store, damaged, or of another
-/// format version (both are named).
+/// Opens read-only. Errors: ErrorCode::input missing or unreadable, ErrorCode::store not a store, damaged, or of
+/// another format version (both are named).
 class SqliteStore final : public TileStore {
 public:
     static Result<std::unique_ptr<SqliteStore>> open(const std::string& path);
@@ -48,8 +48,8 @@ private:
     Dataset dataset_;
 };
 
-/// Writes a new store. Single thread. The file under `path` is complete only after finish() returned ok: the caller builds
-/// under a temporary name and renames.
+/// Writes a new store. Single thread. The file under `path` is complete only after finish() returned ok: the caller
+/// builds under a temporary name and renames.
 class SqliteStoreWriter {
 public:
     static Result<std::unique_ptr<SqliteStoreWriter>> create(const std::string& path);

@@ -24,8 +24,8 @@ struct TileRow {
 class TileReader {
 public:
     virtual ~TileReader() = default;
-    /// Reads a row into `row` (its buffer is reused). False: there is no such tile. Errors: ErrorCode::store for a checksum
-    /// that does not match, ErrorCode::io for what the file system says.
+    /// Reads a row into `row` (its buffer is reused). False: there is no such tile. Errors: ErrorCode::store for a
+    /// checksum that does not match, ErrorCode::io for what the file system says.
     virtual Result<bool> read(TileKind kind, TileId id, TileRow& row) = 0;
 };
 

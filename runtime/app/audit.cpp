@@ -83,9 +83,11 @@ Result<void> audit_frame(const TileStore& store, TileReader& reader, const Camer
                         const auto k = static_cast<std::size_t>(r * (m + 1) + c);
                         if (!present.empty() && present[k] == 0) continue;
                         const std::int64_t i = x * m + c, j = y * m + r;
-                        const glm::dvec3 truth{l.x_m(static_cast<double>(i)), l.y_m(static_cast<double>(j)), d.height_m(tile->samples[k])};
+                        const glm::dvec3 truth{l.x_m(static_cast<double>(i)), l.y_m(static_cast<double>(j)),
+                                               d.height_m(tile->samples[k])};
                         if (!frustum.contains(truth)) continue;
-                        const ExactHeight z = drawn_height(drawn, n, {item.geomip, item.edge_mask}, i - corner.i, j - corner.j, step);
+                        const ExactHeight z =
+                            drawn_height(drawn, n, {item.geomip, item.edge_mask}, i - corner.i, j - corner.j, step);
                         if (z.numerator == z.denominator * tile->samples[k]) {
                             errors.add(0);
                             continue;

@@ -1,6 +1,6 @@
-// Audit: the truth about drawn frames, from the finest data. For every finest vertex of a present cell in view, the distance
-// in pixels between its projection and that of the drawn surface above or below it; occlusion is ignored, so it is an upper
-// figure (Scree lod, test data).
+// Audit: the truth about drawn frames, from the finest data. For every finest vertex of a present cell in view, the
+// distance in pixels between its projection and that of the drawn surface above or below it; occlusion is ignored, so
+// it is an upper figure (Scree lod, test data).
 #pragma once
 
 #include <array>

@@ -62,11 +62,13 @@ Result<AuditResult> audit(const ViewOptions& o, int frames) {
 }  // namespace
 
 int run_audit(int argc, char** argv) {
-    CLI::App app{"Measures the drawn surface against the finest data, in pixels, and looks for cracks.", "scree-view audit"};
+    CLI::App app{"Measures the drawn surface against the finest data, in pixels, and looks for cracks.",
+                 "scree-view audit"};
     ViewOptions o;
     int frames = 12;
     add_view_options(app, o);
-    app.add_option("--path", o.path, "CSV of eye_x,eye_y,eye_z,look_x,look_y,look_z; default: a low, a high and a steep part");
+    app.add_option("--path", o.path,
+                   "CSV of eye_x,eye_y,eye_z,look_x,look_y,look_z; default: a low, a high and a steep part");
     app.add_option("--frames", frames, "Poses along the path")->capture_default_str()->check(CLI::Range(1, 1000000));
     if (const int code = parse_arguments(app, argc, argv); code >= 0) return code;
     if (auto ok = check_view_options(o); !ok) return report_error("scree-view audit", ok.error());
@@ -76,13 +78,16 @@ int run_audit(int argc, char** argv) {
     const AuditResult& r = *result;
     // What was promised: tau, or the stated bound where the budget or the data's own depth did not allow tau.
     const double promised = std::max(o.tau_px, r.max_bound_px) + kRoundingPx;
-    const bool kept = r.errors.max() <= promised && r.cracks.open_edges == 0 && r.cracks.t_junctions == 0 && r.holes == 0;
+    const bool kept =
+        r.errors.max() <= promised && r.cracks.open_edges == 0 && r.cracks.t_junctions == 0 && r.holes == 0;
     if (o.json != "-")
-        fmt::print("{} frames, {} samples: error max {:.4f} px, p99 {:.4f}, mean {:.5f}; promised {:.4f} at tau {}\n"
-                   "{} open edges, {} T-junctions, {} holes{}: {}\n",
-                   r.frames, r.errors.count(), r.errors.max(), r.errors.quantile(0.99), r.errors.mean(), r.max_bound_px, o.tau_px,
-                   r.cracks.open_edges, r.cracks.t_junctions, r.holes, r.limited > 0 ? fmt::format(" ({} frames limited by the budget)", r.limited) : "",
-                   kept ? "the promise holds" : "THE PROMISE IS BROKEN");
+        fmt::print(
+            "{} frames, {} samples: error max {:.4f} px, p99 {:.4f}, mean {:.5f}; promised {:.4f} at tau {}\n"
+            "{} open edges, {} T-junctions, {} holes{}: {}\n",
+            r.frames, r.errors.count(), r.errors.max(), r.errors.quantile(0.99), r.errors.mean(), r.max_bound_px,
+            o.tau_px, r.cracks.open_edges, r.cracks.t_junctions, r.holes,
+            r.limited > 0 ? fmt::format(" ({} frames limited by the budget)", r.limited) : "",
+            kept ? "the promise holds" : "THE PROMISE IS BROKEN");
     if (!o.json.empty()) {
         const nlohmann::ordered_json report = {{"frames", r.frames},
                                                {"tau_px", o.tau_px},
@@ -95,7 +100,8 @@ int run_audit(int argc, char** argv) {
                                                {"samples", r.errors.count()},
                                                {"holes", r.holes},
                                                {"budget_limited_frames", r.limited}};
-        if (auto ok = write_text(o.json, report.dump(2) + "\n"); !ok) return report_error("scree-view audit", ok.error());
+        if (auto ok = write_text(o.json, report.dump(2) + "\n"); !ok)
+            return report_error("scree-view audit", ok.error());
     }
     return kept ? 0 : static_cast<int>(ErrorCode::check_failed);
 }

@@ -20,7 +20,8 @@ struct Walk {
         const Lattice& l = dataset.lattice;
         const LatticePoint c = l.corner(id);
         const std::int64_t extent = l.tile_extent(id.level);
-        return std::max<std::int64_t>(0, std::min(extent, l.cells_x - c.i)) * std::max<std::int64_t>(0, std::min(extent, l.cells_y - c.j));
+        return std::max<std::int64_t>(0, std::min(extent, l.cells_x - c.i)) *
+               std::max<std::int64_t>(0, std::min(extent, l.cells_y - c.j));
     }
 
     void visit(TileId id, const HeightBounds& bounds) {
@@ -31,8 +32,10 @@ struct Walk {
         const Lattice& l = dataset.lattice;
         const LatticePoint c = l.corner(id);
         const std::int64_t extent = l.tile_extent(id.level);
-        const Box box{{l.x_m(static_cast<double>(c.i)), l.y_m(static_cast<double>(std::min(c.j + extent, l.cells_y))), dataset.height_m(bounds.min_n)},
-                      {l.x_m(static_cast<double>(std::min(c.i + extent, l.cells_x))), l.y_m(static_cast<double>(c.j)), dataset.height_m(bounds.max_n)}};
+        const Box box{{l.x_m(static_cast<double>(c.i)), l.y_m(static_cast<double>(std::min(c.j + extent, l.cells_y))),
+                       dataset.height_m(bounds.min_n)},
+                      {l.x_m(static_cast<double>(std::min(c.i + extent, l.cells_x))), l.y_m(static_cast<double>(c.j)),
+                       dataset.height_m(bounds.max_n)}};
         if (!frustum.may_see(box)) return;
         const ResidentHeight resident = residency.height(id);
         if (resident.header == nullptr || resident.header->child_mask == 0) {
@@ -47,14 +50,16 @@ struct Walk {
 
 }  // namespace
 
-std::int64_t count_holes(const Dataset& dataset, const Residency& residency, const Camera& camera, const DrawList& draws) {
+std::int64_t count_holes(const Dataset& dataset, const Residency& residency, const Camera& camera,
+                         const DrawList& draws) {
     Walk walk{dataset, residency, Frustum(camera), {}, 0, 0};
     for (const DrawItem& item : draws)
         if (!walk.drawn.insert(item.tile).second) walk.holes += walk.cells(item.tile);
     const Lattice& l = dataset.lattice;
     for (std::int64_t y = 0; y < l.root_rows; ++y)
         for (std::int64_t x = 0; x < l.root_columns; ++x)
-            if (const ResidentHeight root = residency.height({0, x, y}); root.header != nullptr) walk.visit({0, x, y}, root.header->own);
+            if (const ResidentHeight root = residency.height({0, x, y}); root.header != nullptr)
+                walk.visit({0, x, y}, root.header->own);
     // What the walk did not meet lies under another drawn node: covered twice.
     if (walk.reached < static_cast<std::int64_t>(walk.drawn.size()))
         for (const TileId id : walk.drawn)

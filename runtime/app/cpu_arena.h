@@ -1,5 +1,5 @@
-// CpuArena: a sink that keeps the heights of every slot in ordinary memory, as they were handed over for drawing, for what
-// must look at the drawn surface (audit, --mesh). May pass tiles on to another sink.
+// CpuArena: a sink that keeps the heights of every slot in ordinary memory, as they were handed over for drawing, for
+// what must look at the drawn surface (audit, --mesh). May pass tiles on to another sink.
 #pragma once
 
 #include <span>

@@ -16,8 +16,9 @@ FrameSettings scenery(const Dataset& d) {
 Result<std::unique_ptr<Display>> Display::create(const Scene& scene, const DisplayOptions& o) {
     const Dataset& d = scene.dataset();
     std::unique_ptr<Display> display(new Display);
-    auto context = o.window ? create_window_context({"Scree", o.width_px, o.height_px, o.wait_for_refresh, o.visible_window})
-                            : create_headless_context();
+    auto context = o.window
+                       ? create_window_context({"Scree", o.width_px, o.height_px, o.wait_for_refresh, o.visible_window})
+                       : create_headless_context();
     if (!context) return context.error();
     display->context_ = std::move(*context);
     RendererOptions options;
@@ -43,7 +44,9 @@ void Display::put_height(std::int32_t slot, std::span<const SlotVertex> vertices
     if (arena_) arena_->put_height(slot, vertices);
 }
 
-void Display::put_texture(std::int32_t slot, std::span<const std::uint8_t> chain) { renderer_->upload_texture(slot, chain); }
+void Display::put_texture(std::int32_t slot, std::span<const std::uint8_t> chain) {
+    renderer_->upload_texture(slot, chain);
+}
 
 Result<void> Display::resize(int width_px, int height_px) {
     auto target = RenderTarget::create({width_px, height_px, samples_});

@@ -28,7 +28,8 @@ public:
         if (i < 0 || j < 0) return false;
         for (int level = 0; level <= lattice_.deepest_level; ++level) {
             const auto extent = static_cast<double>(lattice_.tile_extent(level));
-            if (tiles_.contains({level, static_cast<std::int64_t>(i / extent), static_cast<std::int64_t>(j / extent)})) return true;
+            if (tiles_.contains({level, static_cast<std::int64_t>(i / extent), static_cast<std::int64_t>(j / extent)}))
+                return true;
         }
         return false;
     }
@@ -83,7 +84,8 @@ CrackReport count_cracks(const Dataset& d, const DrawList& draws, const DrawnMes
     const Coverage covered(d, draws);
     std::vector<Edge> open;
     for (std::size_t first = 0, last = 0; first < edges.size(); first = last) {
-        while (last < edges.size() && edges[last].low == edges[first].low && edges[last].high == edges[first].high) ++last;
+        while (last < edges.size() && edges[last].low == edges[first].low && edges[last].high == edges[first].high)
+            ++last;
         if (last - first == 2 && edges[first].forward != edges[first + 1].forward) continue;
         for (std::size_t k = first; k < last; ++k) {
             // Half a cell to the right of the edge, as its triangle runs, lies what should have shared it.
@@ -110,8 +112,10 @@ Result<void> write_ply(const std::string& file, const Dataset& d, const DrawnMes
     std::sort(vertices.begin(), vertices.end());
     vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
     std::string text = fmt::format(
-        "ply\nformat binary_little_endian 1.0\ncomment drawn by scree-view; metres of the dataset's CRS\nelement vertex {}\n"
-        "property double x\nproperty double y\nproperty double z\nelement face {}\nproperty list uchar int vertex_indices\n"
+        "ply\nformat binary_little_endian 1.0\ncomment drawn by scree-view; metres of the dataset's CRS\nelement "
+        "vertex {}\n"
+        "property double x\nproperty double y\nproperty double z\nelement face {}\nproperty list uchar int "
+        "vertex_indices\n"
         "end_header\n",
         vertices.size(), mesh.corners.size() / 3);
     const auto append = [&](const auto& value) {
@@ -127,7 +131,8 @@ Result<void> write_ply(const std::string& file, const Dataset& d, const DrawnMes
     for (std::size_t t = 0; t < mesh.corners.size(); t += 3) {
         text.push_back(3);
         for (std::size_t k = 0; k < 3; ++k)
-            append(static_cast<std::int32_t>(std::lower_bound(vertices.begin(), vertices.end(), mesh.corners[t + k]) - vertices.begin()));
+            append(static_cast<std::int32_t>(std::lower_bound(vertices.begin(), vertices.end(), mesh.corners[t + k]) -
+                                             vertices.begin()));
     }
     return write_text(file, text);
 }

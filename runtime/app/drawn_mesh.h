@@ -21,7 +21,8 @@ struct DrawnMesh {
     std::vector<LatticeVertex> corners;  ///< three a triangle, counter-clockwise from above
 };
 
-DrawnMesh drawn_mesh(const Dataset& dataset, const TilePatterns& patterns, const DrawList& draws, const CpuArena& arena);
+DrawnMesh drawn_mesh(const Dataset& dataset, const TilePatterns& patterns, const DrawList& draws,
+                     const CpuArena& arena);
 
 struct CrackReport {
     std::int64_t edges = 0;        ///< sides of triangles, each triangle's three

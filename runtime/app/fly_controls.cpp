@@ -58,7 +58,8 @@ void FlyControls::move(double seconds, double ground_m) {
     if (down(GLFW_KEY_RIGHT)) heading_ -= turn, moved_ = true;
     if (down(GLFW_KEY_UP)) pitch_ = std::min(kSteepest, pitch_ + turn), moved_ = true;
     if (down(GLFW_KEY_DOWN)) pitch_ = std::max(-kSteepest, pitch_ - turn), moved_ = true;
-    const glm::dvec3 ahead{std::cos(heading_) * std::cos(pitch_), std::sin(heading_) * std::cos(pitch_), std::sin(pitch_)};
+    const glm::dvec3 ahead{std::cos(heading_) * std::cos(pitch_), std::sin(heading_) * std::cos(pitch_),
+                           std::sin(pitch_)};
     const glm::dvec3 right{std::sin(heading_), -std::cos(heading_), 0};
     glm::dvec3 step{0};
     if (down(GLFW_KEY_W)) step += ahead;
@@ -79,7 +80,8 @@ void FlyControls::move(double seconds, double ground_m) {
 }
 
 FlightPose FlyControls::pose() const {
-    return {eye_, eye_ + 1000.0 * glm::dvec3(std::cos(heading_) * std::cos(pitch_), std::sin(heading_) * std::cos(pitch_), std::sin(pitch_))};
+    return {eye_, eye_ + 1000.0 * glm::dvec3(std::cos(heading_) * std::cos(pitch_),
+                                             std::sin(heading_) * std::cos(pitch_), std::sin(pitch_))};
 }
 
 }  // namespace scree

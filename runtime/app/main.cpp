@@ -17,7 +17,8 @@ struct Command {
     int (*run)(int, char**);
 };
 
-constexpr std::array<Command, 3> kCommands{{{"shot", scree::run_shot}, {"fly", scree::run_fly}, {"audit", scree::run_audit}}};
+constexpr std::array<Command, 3> kCommands{
+    {{"shot", scree::run_shot}, {"fly", scree::run_fly}, {"audit", scree::run_audit}}};
 
 int dispatch(int argc, char** argv) {
     const std::string_view name = argc > 1 ? argv[1] : "";

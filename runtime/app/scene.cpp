@@ -20,7 +20,8 @@ Result<std::unique_ptr<Scene>> Scene::open(const SqliteStore& store, const Scene
 }
 
 Result<void> Scene::start(TileSink& sink) {
-    auto pager = Pager::create(store_, {memory_, options_.loader_threads, options_.latency_ms, options_.textures}, sink);
+    auto pager =
+        Pager::create(store_, {memory_, options_.loader_threads, options_.latency_ms, options_.textures}, sink);
     if (!pager) return pager.error();
     pager_ = std::move(*pager);
     pager_->on_damage = [path = store_.path()](const std::string& what) { note("{}: {}\n", path, what); };
@@ -31,8 +32,8 @@ SceneFrame Scene::think(std::span<const Camera> views) {
     const auto start = std::chrono::steady_clock::now();
     const Selection& selection = selector_.select(
         views, {options_.tau_px, options_.texture_tau_px, memory_.height_slots, memory_.texture_slots}, *pager_);
-    pager_->request({selection.planned_heights, selection.planned_textures, selection.standing_in, selection.standing_in_textures,
-                     selection.requests});
+    pager_->request({selection.planned_heights, selection.planned_textures, selection.standing_in,
+                     selection.standing_in_textures, selection.requests});
     SceneFrame frame;
     frame.selection = &selection;
     frame.select_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();

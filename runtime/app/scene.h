@@ -1,5 +1,5 @@
-// Scene: a store with everything needed to choose and hold what is drawn of it: memory plan, pager, selector. No OpenGL: the
-// sink decides where tiles go. Frame-loop thread only.
+// Scene: a store with everything needed to choose and hold what is drawn of it: memory plan, pager, selector. No
+// OpenGL: the sink decides where tiles go. Frame-loop thread only.
 #pragma once
 
 #include <cstdint>

@@ -24,8 +24,8 @@ std::optional<glm::dvec3> parse_point(const std::string& text) {
     return p;
 }
 
-Result<void> shoot(const ViewOptions& o, const std::optional<FlightPose>& asked, const std::string& out, const std::string& mesh_file,
-                   const FrameSettings& debug) {
+Result<void> shoot(const ViewOptions& o, const std::optional<FlightPose>& asked, const std::string& out,
+                   const std::string& mesh_file, const FrameSettings& debug) {
     auto store = SqliteStore::open(o.store);
     if (!store) return store.error();
     auto scene = Scene::open(**store, scene_options(o));
@@ -50,11 +50,13 @@ Result<void> shoot(const ViewOptions& o, const std::optional<FlightPose>& asked,
     if (auto ok = write_png(out, o.width_px, o.height_px, pixels); !ok) return ok;
     if (!mesh_file.empty()) {
         const TilePatterns patterns(d.lattice.tile_cells_log2);
-        if (auto ok = write_ply(mesh_file, d, drawn_mesh(d, patterns, selection.draws[0], *(*display)->arena())); !ok) return ok;
+        if (auto ok = write_ply(mesh_file, d, drawn_mesh(d, patterns, selection.draws[0], *(*display)->arena())); !ok)
+            return ok;
     }
     if (o.json != "-")
-        fmt::print("{}: {} triangles in {} tiles, at most {:.3g} px from the finest surface{}\n", out, selection.triangles,
-                   selection.nodes, selection.max_bound_px, selection.budget_limited ? " (limited by the budget)" : "");
+        fmt::print("{}: {} triangles in {} tiles, at most {:.3g} px from the finest surface{}\n", out,
+                   selection.triangles, selection.nodes, selection.max_bound_px,
+                   selection.budget_limited ? " (limited by the budget)" : "");
     if (o.json.empty()) return {};
     const nlohmann::ordered_json report = {{"triangles", selection.triangles},
                                            {"tiles_drawn", selection.nodes},
@@ -74,7 +76,8 @@ int run_shot(int argc, char** argv) {
     FrameSettings debug;
     add_view_options(app, o);
     app.add_option("-o,--output", out, "The PNG to write")->required();
-    auto* eye_option = app.add_option("--eye", eye, "X,Y,Z of the camera, metres in the dataset's CRS; default: an overview");
+    auto* eye_option =
+        app.add_option("--eye", eye, "X,Y,Z of the camera, metres in the dataset's CRS; default: an overview");
     app.add_option("--look", look, "X,Y,Z that it looks at")->needs(eye_option);
     app.add_option("--mesh", mesh, "Also write the drawn triangles as a binary PLY in the dataset's coordinates");
     app.add_flag("--wireframe", debug.wireframe, "Draw edges only");

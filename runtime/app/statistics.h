@@ -26,7 +26,9 @@ struct Series {
         const auto rank = static_cast<std::size_t>(std::ceil(q * static_cast<double>(sorted.size())));
         return sorted[std::clamp<std::size_t>(rank, 1, sorted.size()) - 1];
     }
-    nlohmann::ordered_json spread() const { return {{"median", quantile(0.5)}, {"p99", quantile(0.99)}, {"max", max()}}; }
+    nlohmann::ordered_json spread() const {
+        return {{"median", quantile(0.5)}, {"p99", quantile(0.99)}, {"max", max()}};
+    }
     nlohmann::ordered_json mean_max() const { return {{"mean", mean()}, {"max", max()}}; }
 };
 

@@ -34,7 +34,8 @@ private:
 };
 
 struct Keys {
-    KeyPress wireframe{GLFW_KEY_F}, levels{GLFW_KEY_L}, finer{GLFW_KEY_RIGHT_BRACKET}, coarser{GLFW_KEY_LEFT_BRACKET}, hud{GLFW_KEY_H};
+    KeyPress wireframe{GLFW_KEY_F}, levels{GLFW_KEY_L}, finer{GLFW_KEY_RIGHT_BRACKET}, coarser{GLFW_KEY_LEFT_BRACKET},
+        hud{GLFW_KEY_H};
 };
 
 HudLines status_lines(const Scene& scene, const SceneFrame& frame, const FlightPose& pose, double fps, double speed) {
@@ -42,7 +43,8 @@ HudLines status_lines(const Scene& scene, const SceneFrame& frame, const FlightP
     HudLines lines;
     lines.title = fmt::format("{:.0f} fps   {} triangles in {} tiles", fps, s.triangles, s.nodes);
     lines.body = fmt::format(
-        "within {:.2f} px{}{}\neye {:.0f}, {:.0f}, {:.0f} m   {:.0f} m/s\n\nW A S D Q E fly, drag to look, wheel: speed, Shift: faster\n"
+        "within {:.2f} px{}{}\neye {:.0f}, {:.0f}, {:.0f} m   {:.0f} m/s\n\nW A S D Q E fly, drag to look, wheel: "
+        "speed, Shift: faster\n"
         "[ ] accuracy   F wireframe   L levels   H hide   Home   Esc",
         s.max_bound_px, frame.stand_ins ? fmt::format(", loading {}", s.requests.size()) : "",
         s.budget_limited ? ", limited by the budget" : "", pose.eye.x, pose.eye.y, pose.eye.z, speed);
@@ -122,7 +124,9 @@ Result<void> view(ViewOptions o, double seconds) {
 }  // namespace
 
 int run_view(int argc, char** argv) {
-    CLI::App app{"Opens a window on a terrain. The commands shot, fly and audit work without one: scree-view COMMAND --help.", "scree-view"};
+    CLI::App app{
+        "Opens a window on a terrain. The commands shot, fly and audit work without one: scree-view COMMAND --help.",
+        "scree-view"};
     ViewOptions o;
     o.size = "1280x800";
     double seconds = 0;

@@ -12,8 +12,10 @@ void add_view_options(CLI::App& app, ViewOptions& o) {
     app.add_option("STORE", o.store, "A .scree file")->required();
     app.add_option("--size", o.size, "Picture in pixels, WIDTHxHEIGHT")->capture_default_str();
     app.add_option("--fov", o.fov_deg, "Vertical field of view, degrees")->capture_default_str();
-    app.add_option("--tau", o.tau_px, "Allowed screen-space error, pixels: smaller is truer and costs triangles")->capture_default_str();
-    app.add_option("--texture-tau", o.texture_tau_px, "Screen pixels a texel may cover: smaller is sharper and costs memory")
+    app.add_option("--tau", o.tau_px, "Allowed screen-space error, pixels: smaller is truer and costs triangles")
+        ->capture_default_str();
+    app.add_option("--texture-tau", o.texture_tau_px,
+                   "Screen pixels a texel may cover: smaller is sharper and costs memory")
         ->capture_default_str();
     app.add_option("--budget", o.budget, "Ceiling of tile memory, such as 256M")->capture_default_str();
     app.add_option("--json", o.json, "Write the report as JSON to a file, or - for standard output");
@@ -28,10 +30,12 @@ Result<void> check_view_options(ViewOptions& o) {
     const auto budget = parse_bytes(o.budget);
     if (!budget) return Error{ErrorCode::usage, fmt::format("--budget {} is not a size such as 256M", o.budget)};
     o.budget_bytes = *budget;
-    if (!(std::isfinite(o.tau_px) && o.tau_px >= 0)) return Error{ErrorCode::usage, fmt::format("--tau {} is not a length in pixels", o.tau_px)};
+    if (!(std::isfinite(o.tau_px) && o.tau_px >= 0))
+        return Error{ErrorCode::usage, fmt::format("--tau {} is not a length in pixels", o.tau_px)};
     if (!(std::isfinite(o.texture_tau_px) && o.texture_tau_px > 0))
         return Error{ErrorCode::usage, fmt::format("--texture-tau {} is not above 0", o.texture_tau_px)};
-    if (!(o.fov_deg >= 0.001 && o.fov_deg <= 179)) return Error{ErrorCode::usage, fmt::format("--fov {} is outside 0.001..179 degrees", o.fov_deg)};
+    if (!(o.fov_deg >= 0.001 && o.fov_deg <= 179))
+        return Error{ErrorCode::usage, fmt::format("--fov {} is outside 0.001..179 degrees", o.fov_deg)};
     return {};
 }
 

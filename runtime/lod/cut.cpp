@@ -83,7 +83,8 @@ double Cut::geometry_need(std::int32_t index) const {
     const CutNode& node = nodes_[static_cast<std::size_t>(index)];
     const int geomip = node.exponent - minimum_exponent(node);
     // With thinned edges allowed for: a neighbour may be coarser when all is done.
-    return error_need(node, static_cast<double>(node.bounds.error_n[static_cast<std::size_t>(geomip)]) * dataset_.height_quantum_m);
+    return error_need(
+        node, static_cast<double>(node.bounds.error_n[static_cast<std::size_t>(geomip)]) * dataset_.height_quantum_m);
 }
 
 double Cut::texture_need(const CutNode& node) const {
@@ -153,8 +154,8 @@ bool Cut::step(std::int32_t index) {
     return try_split(index, texture);
 }
 
-// A split hands the stride over to the children, which are finer pages: it must not pass what they can draw, nor the stride
-// of a neighbour that is then the coarser page.
+// A split hands the stride over to the children, which are finer pages: it must not pass what they can draw, nor the
+// stride of a neighbour that is then the coarser page.
 bool Cut::may_split_now(std::int32_t index) const {
     const CutNode& node = nodes_[static_cast<std::size_t>(index)];
     if (node.exponent == minimum_exponent(node)) return true;
@@ -219,7 +220,8 @@ bool Cut::try_split(std::int32_t index, double priority) {
     for (int q = 0; q < 4 && possible; ++q) {
         if ((before.header->child_mask >> q & 1) == 0) continue;
         const TileId id = child_of(before.id, q);
-        const std::int32_t child = add_node(id, before.header->children[static_cast<std::size_t>(q)], index, *residency_);
+        const std::int32_t child =
+            add_node(id, before.header->children[static_cast<std::size_t>(q)], index, *residency_);
         CutNode& node = nodes_[static_cast<std::size_t>(child)];
         node.exponent = before.exponent;
         node.priority = priority;
@@ -268,7 +270,8 @@ unsigned Cut::edge_mask(std::int32_t leaf) const {
     unsigned mask = 0;
     for (const Direction direction : kDirections)
         for_each_neighbour(leaf, direction, [&](std::int32_t other) {
-            if (nodes_[static_cast<std::size_t>(other)].exponent > node.exponent) mask |= 1u << static_cast<int>(direction);
+            if (nodes_[static_cast<std::size_t>(other)].exponent > node.exponent)
+                mask |= 1u << static_cast<int>(direction);
         });
     return mask;
 }

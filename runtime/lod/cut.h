@@ -1,5 +1,5 @@
-// Cut: the tree of nodes that selection refines, and the steps that keep it balanced. Used by Selector and by the tests of
-// balance; no policy here beyond "largest need first".
+// Cut: the tree of nodes that selection refines, and the steps that keep it balanced. Used by Selector and by the tests
+// of balance; no policy here beyond "largest need first".
 #pragma once
 
 #include <array>
@@ -17,7 +17,10 @@ namespace scree {
 /// A camera with what every test needs computed once.
 struct LodView {
     explicit LodView(const Camera& camera)
-        : frustum(camera), eye(camera.eye), focal_px(camera.focal_px()), error_px(camera.focal_px() * camera.off_axis_factor()),
+        : frustum(camera),
+          eye(camera.eye),
+          focal_px(camera.focal_px()),
+          error_px(camera.focal_px() * camera.off_axis_factor()),
           near_m(camera.near_m) {}
     Frustum frustum;
     glm::dvec3 eye;
@@ -27,7 +30,8 @@ struct LodView {
 };
 
 enum class Direction : int { north = 0, east = 1, south = 2, west = 3 };
-inline constexpr std::array<Direction, 4> kDirections{Direction::north, Direction::east, Direction::south, Direction::west};
+inline constexpr std::array<Direction, 4> kDirections{Direction::north, Direction::east, Direction::south,
+                                                      Direction::west};
 
 struct CutNode {
     TileId id;
@@ -36,20 +40,20 @@ struct CutNode {
     std::int32_t slot = -1;
     std::int32_t parent = -1;
     std::array<std::int32_t, 4> children{-1, -1, -1, -1};  ///< -1: does not exist, or the node is not split
-    std::int32_t exponent = 0;  ///< log2 of the stride drawn, in finest cells
+    std::int32_t exponent = 0;                             ///< log2 of the stride drawn, in finest cells
     bool split = false;
-    bool visible = false;  ///< in any view; invisible nodes are never refined or drawn
-    bool blocked = false;  ///< a step failed; it would fail again
+    bool visible = false;      ///< in any view; invisible nodes are never refined or drawn
+    bool blocked = false;      ///< a step failed; it would fail again
     double metres_per_px = 0;  ///< smallest over the views that see it of d / (f K): error allowed for one pixel
     double texel_per_px = 0;   ///< smallest over the views of d / f: metres of texture a pixel covers
-    double priority = 0;   ///< need of the parent when it was split
+    double priority = 0;       ///< need of the parent when it was split
 };
 
 struct CutSettings {
     double tau_px = 1;
     double texture_tau_px = 1;
-    std::int64_t max_pages = 0;       ///< visible nodes, split ones included
-    bool only_resident = false;       ///< true: split only where the visible children are resident
+    std::int64_t max_pages = 0;  ///< visible nodes, split ones included
+    bool only_resident = false;  ///< true: split only where the visible children are resident
 };
 
 class Cut {
@@ -119,17 +123,26 @@ void Cut::visit_side(std::int32_t index, Direction side, const Visit& visit) con
     // The two children that touch `side` of the node.
     static constexpr std::array<std::array<int, 2>, 4> kTouching{{{0, 1}, {1, 3}, {2, 3}, {0, 2}}};
     for (const int q : kTouching[static_cast<std::size_t>(side)])
-        if (const std::int32_t child = node.children[static_cast<std::size_t>(q)]; child >= 0) visit_side(child, side, visit);
+        if (const std::int32_t child = node.children[static_cast<std::size_t>(q)]; child >= 0)
+            visit_side(child, side, visit);
 }
 
 template <class Visit>
 void Cut::for_each_neighbour(std::int32_t leaf, Direction direction, const Visit& visit) const {
     TileId id = nodes_[static_cast<std::size_t>(leaf)].id;
     switch (direction) {
-        case Direction::north: --id.y; break;
-        case Direction::east: ++id.x; break;
-        case Direction::south: ++id.y; break;
-        case Direction::west: --id.x; break;
+        case Direction::north:
+            --id.y;
+            break;
+        case Direction::east:
+            ++id.x;
+            break;
+        case Direction::south:
+            ++id.y;
+            break;
+        case Direction::west:
+            --id.x;
+            break;
     }
     const std::int32_t found = find(id);
     if (found < 0) return;

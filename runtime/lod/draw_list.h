@@ -1,5 +1,5 @@
-// What selection hands to the renderer, by slot numbers: an item a tile, or several where a tile of the deepest height level
-// carries textures deeper still, one a part of the tile. No OpenGL here.
+// What selection hands to the renderer, by slot numbers: an item a tile, or several where a tile of the deepest height
+// level carries textures deeper still, one a part of the tile. No OpenGL here.
 #pragma once
 
 #include <cstdint>

@@ -35,8 +35,8 @@ struct Selector::Impl {
     std::vector<TextureWish> sorted;
     std::unordered_set<TileId, TileIdHash> planned_textures;
 
-    // The texture level at which a texel covers no more than the allowed pixels at the node's nearest point; not deeper than
-    // the node's own page (a page is split for its texture) nor the pyramid.
+    // The texture level at which a texel covers no more than the allowed pixels at the node's nearest point; not deeper
+    // than the node's own page (a page is split for its texture) nor the pyramid.
     int texture_level(const CutNode& node, double texture_tau_px) const {
         const int deepest = std::min(node.id.level, dataset.texture_deepest_level);
         int level = 0;
@@ -51,21 +51,26 @@ struct Selector::Impl {
         const Lattice& l = dataset.lattice;
         const double side = std::ldexp(static_cast<double>(l.tile_extent(node.id.level)), -part.level);
         const LatticePoint corner = l.corner(node.id);
-        const double i = static_cast<double>(corner.i) + part.x * side, j = static_cast<double>(corner.j) + part.y * side;
-        const double east = std::min(i + side, static_cast<double>(l.cells_x)), south = std::min(j + side, static_cast<double>(l.cells_y));
+        const double i = static_cast<double>(corner.i) + part.x * side,
+                     j = static_cast<double>(corner.j) + part.y * side;
+        const double east = std::min(i + side, static_cast<double>(l.cells_x)),
+                     south = std::min(j + side, static_cast<double>(l.cells_y));
         if (east <= i || south <= j) return kInfinity;
         const Box box{{l.x_m(i), l.y_m(south), dataset.height_m(node.bounds.min_n)},
                       {l.x_m(east), l.y_m(j), dataset.height_m(node.bounds.max_n)}};
         double least = kInfinity;
         for (const LodView& view : views)
-            if (view.frustum.may_see(box)) least = std::min(least, std::max(distance_to_box(view.eye, box), view.near_m) / view.focal_px);
+            if (view.frustum.may_see(box))
+                least = std::min(least, std::max(distance_to_box(view.eye, box), view.near_m) / view.focal_px);
         return least;
     }
 
     // Visits the existing children of a part's texture that deserve to be resident.
     template <class Visit>
-    void for_each_deep_child(const CutNode& node, TilePart part, double texture_tau_px, const Residency& residency, const Visit& visit) const {
-        const TileId texture{node.id.level + part.level, (node.id.x << part.level) + part.x, (node.id.y << part.level) + part.y};
+    void for_each_deep_child(const CutNode& node, TilePart part, double texture_tau_px, const Residency& residency,
+                             const Visit& visit) const {
+        const TileId texture{node.id.level + part.level, (node.id.x << part.level) + part.x,
+                             (node.id.y << part.level) + part.y};
         if (texture.level >= dataset.texture_deepest_level || part.level >= dataset.lattice.tile_cells_log2 - 1) return;
         const std::uint8_t exists = residency.texture_children(texture);
         for (int q = 0; q < 4; ++q) {
@@ -84,8 +89,8 @@ struct Selector::Impl {
         });
     }
 
-    // Parts of a page, each with the deepest texture it deserves and has. A part whose texture has no child there at all
-    // shows nothing there: no present cell lies under it.
+    // Parts of a page, each with the deepest texture it deserves and has. A part whose texture has no child there at
+    // all shows nothing there: no present cell lies under it.
     void emit_parts(const CutNode& node, DrawItem item, double texture_tau_px, const Residency& residency,
                     bool only_planned, DrawList& out) const {
         const TilePart part = item.part;
@@ -119,16 +124,18 @@ struct Selector::Impl {
                 out.push_back(child);
             }
         }
-            }
+    }
 
-    // Which texture tiles the plan deserves, coarse before fine, cut off where slots end. Ancestors are kept: they stand in.
+    // Which texture tiles the plan deserves, coarse before fine, cut off where slots end. Ancestors are kept: they
+    // stand in.
     void plan_textures(const SelectionSettings& settings, const Residency& residency) {
         wishes.clear();
         for (const CutNode& node : plan.nodes()) {
             if (node.split || !node.visible) continue;
             const int wanted = texture_level(node, settings.texture_tau_px);
             for (int level = wanted; level >= 0; --level) {
-                const double need = level == 0 ? kInfinity : dataset.texel_m(level - 1) / node.texel_per_px / settings.texture_tau_px;
+                const double need =
+                    level == 0 ? kInfinity : dataset.texel_m(level - 1) / node.texel_per_px / settings.texture_tau_px;
                 auto [it, inserted] = wishes.try_emplace(ancestor_at(node.id, level), need);
                 if (!inserted) {
                     if (it->second >= need) break;  // the ancestors have been reached from as near before
@@ -159,7 +166,8 @@ struct Selector::Impl {
     }
 
     // The texture a leaf is drawn with: the planned one when all is there, else the nearest resident ancestor.
-    void assign_texture(const CutNode& node, double texture_tau_px, const Residency& residency, bool only_planned, DrawItem& item) {
+    void assign_texture(const CutNode& node, double texture_tau_px, const Residency& residency, bool only_planned,
+                        DrawItem& item) {
         int level = texture_level(node, texture_tau_px);
         for (; level > 0; --level) {
             const TileId id = ancestor_at(node.id, level);
@@ -173,11 +181,12 @@ struct Selector::Impl {
         item.texture_scale = static_cast<float>(std::ldexp(1.0, -up));
         item.texture_offset_u = static_cast<float>(std::ldexp(static_cast<double>(node.id.x & mask), -up));
         item.texture_offset_v = static_cast<float>(std::ldexp(static_cast<double>(node.id.y & mask), -up));
-        if (!planned_textures.contains(ancestor_at(node.id, level))) result.standing_in_textures.push_back(ancestor_at(node.id, level));
+        if (!planned_textures.contains(ancestor_at(node.id, level)))
+            result.standing_in_textures.push_back(ancestor_at(node.id, level));
     }
 
-    void emit(const Cut& cut, std::span<const Camera> cameras, const SelectionSettings& settings, const Residency& residency,
-              bool only_planned) {
+    void emit(const Cut& cut, std::span<const Camera> cameras, const SelectionSettings& settings,
+              const Residency& residency, bool only_planned) {
         const int n = dataset.lattice.tile_cells_log2;
         const auto& nodes = cut.nodes();
         for (std::size_t k = 0; k < nodes.size(); ++k) {
@@ -233,7 +242,8 @@ Selector::Selector(const Dataset& dataset) : impl_(std::make_unique<Impl>(datase
 Selector::~Selector() = default;
 Selector::Selector(Selector&&) noexcept = default;
 
-const Selection& Selector::select(std::span<const Camera> cameras, const SelectionSettings& settings, const Residency& residency) {
+const Selection& Selector::select(std::span<const Camera> cameras, const SelectionSettings& settings,
+                                  const Residency& residency) {
     Impl& s = *impl_;
     Selection& r = s.result;
     r.draws.resize(cameras.size());
@@ -254,12 +264,14 @@ const Selection& Selector::select(std::span<const Camera> cameras, const Selecti
     r.budget_limited = s.plan.page_limited();
     s.plan_textures(settings, residency);
     s.request_missing(residency);
-    const bool heights_complete = std::none_of(r.requests.begin(), r.requests.end(), [](const TileRequest& q) { return q.kind == TileKind::height; });
+    const bool heights_complete = std::none_of(r.requests.begin(), r.requests.end(),
+                                               [](const TileRequest& q) { return q.kind == TileKind::height; });
     if (heights_complete) {
         s.emit(s.plan, cameras, settings, residency, r.complete);
         return r;
     }
-    s.standing.refine(s.views, {settings.tau_px, settings.texture_tau_px, std::numeric_limits<std::int64_t>::max(), true}, residency);
+    s.standing.refine(
+        s.views, {settings.tau_px, settings.texture_tau_px, std::numeric_limits<std::int64_t>::max(), true}, residency);
     r.refine_steps += s.standing.steps();
     for (const CutNode& node : s.standing.nodes())
         if (node.visible) r.standing_in.push_back(node.id);

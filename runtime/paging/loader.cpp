@@ -121,7 +121,8 @@ void Loader::edit_queue(const std::function<void(std::vector<LoadJob>&)>& edit) 
 bool Loader::take(LoadedTile& out, bool wait) {
     std::unique_lock lock(impl_->mutex);
     if (wait)
-        impl_->tile_ready.wait(lock, [&] { return !impl_->finished.empty() || (impl_->queue.empty() && impl_->being_read == 0); });
+        impl_->tile_ready.wait(
+            lock, [&] { return !impl_->finished.empty() || (impl_->queue.empty() && impl_->being_read == 0); });
     if (impl_->finished.empty()) return false;
     out = std::move(impl_->finished.front());
     impl_->finished.pop_front();

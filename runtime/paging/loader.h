@@ -1,5 +1,5 @@
-// Loader: threads that read and decode tiles in order of urgency. Bounded: at most `staging_slots` tiles of each kind exist
-// between disk and GPU. All functions are called by the frame-loop thread; the threads are inside.
+// Loader: threads that read and decode tiles in order of urgency. Bounded: at most `staging_slots` tiles of each kind
+// exist between disk and GPU. All functions are called by the frame-loop thread; the threads are inside.
 #pragma once
 
 #include <cstdint>
@@ -25,9 +25,9 @@ struct LoadedTile {
     LoadJob job;
     std::string error;  ///< empty: loaded
     HeightTileHeader header;
-    std::vector<SlotVertex> vertices;    ///< height tiles
-    std::vector<std::uint8_t> blocks;    ///< texture tiles, mip chain coarsest first
-    std::int64_t bytes_read = 0;         ///< payload as stored
+    std::vector<SlotVertex> vertices;  ///< height tiles
+    std::vector<std::uint8_t> blocks;  ///< texture tiles, mip chain coarsest first
+    std::int64_t bytes_read = 0;       ///< payload as stored
 };
 
 class Loader {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "common/height_tile.h"
 #include "common/mesh/vertex_slot.h"
@@ -11,9 +12,11 @@
 namespace scree {
 namespace {
 
-constexpr std::int64_t kStagingSlots = 96;     // of each kind: what two threads decode in a frame of 30 ms
+constexpr std::int64_t kStagingSlots = 96;       // of each kind: what two threads decode in a frame of 30 ms
 constexpr std::int64_t kBookkeepingBytes = 160;  // hash map entry, list links, ids
-constexpr double kHeightShare = 0.3;           // 14.6 KB against 43.7 KB: a page for each texture and a quarter more
+constexpr double kHeightShare = 0.3;             // 14.6 KB against 43.7 KB: a page for each texture and a quarter more
+
+constexpr double kMebibyte = 1024.0 * 1024;
 
 }  // namespace
 
@@ -35,13 +38,17 @@ Result<MemoryPlan> plan_memory(const Dataset& d, std::int64_t budget_bytes) {
     // Besides the roots a split needs four tiles of each kind.
     const std::int64_t needed = std::max(8 * pinned, staging + pinned + 4 * (height + texture));
     if (budget_bytes < needed)
-        return Error{ErrorCode::usage, fmt::format("--budget {:.1f} MB is too small for this store: {:.1f} MB are needed ({} pinned "
-                                                   "root{} may take an eighth)",
-                                                   static_cast<double>(budget_bytes) / 1e6, static_cast<double>(needed) / 1e6, roots,
-                                                   roots == 1 ? "" : "s")};
+        return Error{
+            ErrorCode::usage,
+            fmt::format("--budget {:.1f} MiB is too small for this store: {:.1f} MiB are needed ({} pinned "
+                        "root{} may take an eighth)",
+                        static_cast<double>(budget_bytes) / kMebibyte,
+                        std::ceil(static_cast<double>(needed) / kMebibyte * 10) / 10, roots, roots == 1 ? "" : "s")};
     const std::int64_t free = budget_bytes - staging;
-    plan.height_slots = std::min(std::max(static_cast<std::int64_t>(kHeightShare * static_cast<double>(free)) / height,
-                                          roots + 4), d.height_tiles);
+    // Heights take their share, but leave textures room to split a root.
+    const std::int64_t share = std::min(static_cast<std::int64_t>(kHeightShare * static_cast<double>(free)),
+                                        free - std::min(roots + 4, d.texture_tiles) * texture);
+    plan.height_slots = std::min(std::max(share / height, roots + 4), d.height_tiles);
     plan.texture_slots = std::clamp<std::int64_t>((free - plan.height_slots * height) / texture, 1, d.texture_tiles);
     // What a small texture pyramid leaves over goes to heights.
     plan.height_slots = std::min((free - plan.texture_slots * texture) / height, d.height_tiles);

@@ -93,8 +93,9 @@ void Pager::accept(LoadedTile&& tile) {
         cache(job.kind).fail(job.id);
         ++counters_.damaged_tiles;
         if (on_damage)
-            on_damage(fmt::format("{} tile {}/{}/{}: {}; its parent stands in", job.kind == TileKind::height ? "height" : "texture",
-                                  job.id.level, job.id.x, job.id.y, tile.error));
+            on_damage(fmt::format("{} tile {}/{}/{}: {}; its parent stands in",
+                                  job.kind == TileKind::height ? "height" : "texture", job.id.level, job.id.x, job.id.y,
+                                  tile.error));
     } else if (job.kind == TileKind::height) {
         sink_.put_height(job.slot, tile.vertices);
         heights_.complete(job.id, &tile.header);
@@ -111,8 +112,8 @@ int Pager::take_arrivals(std::int64_t upload_bytes, bool wait) {
     int taken = 0;
     LoadedTile tile;
     while (upload_bytes > 0 && loader_->take(tile, wait && taken == 0)) {
-        upload_bytes -= static_cast<std::int64_t>(tile.job.kind == TileKind::height ? tile.vertices.size() * sizeof(SlotVertex)
-                                                                                     : tile.blocks.size());
+        upload_bytes -= static_cast<std::int64_t>(
+            tile.job.kind == TileKind::height ? tile.vertices.size() * sizeof(SlotVertex) : tile.blocks.size());
         accept(std::move(tile));
         ++taken;
     }

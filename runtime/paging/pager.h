@@ -1,5 +1,5 @@
-// Pager: tiles in and out of fixed slots. It answers selection's questions (Residency) and carries out its wishes. Loading a
-// tile goes   absent -> reserved (slot taken, job queued) -> being read -> staged -> resident -> evicted,
+// Pager: tiles in and out of fixed slots. It answers selection's questions (Residency) and carries out its wishes.
+// Loading a tile goes   absent -> reserved (slot taken, job queued) -> being read -> staged -> resident -> evicted,
 // with the side ways: queued -> cancelled, read -> unavailable (damaged; said once, its parent stands in).
 // Frame-loop thread only; the loader's threads are inside.
 #pragma once
@@ -31,8 +31,8 @@ public:
 struct PagerOptions {
     MemoryPlan memory;
     int loader_threads = 2;
-    int latency_ms = 0;         ///< every read is delayed by this: to try slow disks
-    bool textures = true;       ///< false: heights alone (audit)
+    int latency_ms = 0;    ///< every read is delayed by this: to try slow disks
+    bool textures = true;  ///< false: heights alone (audit)
 };
 
 struct PagerCounters {
@@ -53,14 +53,14 @@ public:
     bool unavailable_height(TileId id) const override;
     bool unavailable_texture(TileId id) const override;
 
-    /// Hands arrived tiles to the sink, up to `upload_bytes`. `wait`: if nothing has arrived, blocks until something does.
-    /// Returns the tiles taken.
+    /// Hands arrived tiles to the sink, up to `upload_bytes`. `wait`: if nothing has arrived, blocks until something
+    /// does. Returns the tiles taken.
     int take_arrivals(std::int64_t upload_bytes, bool wait);
 
     struct Wishes {
-        std::span<const TileId> planned_heights, planned_textures;        ///< never evicted
-        std::span<const TileId> standing_heights, standing_textures;      ///< evicted last
-        std::span<const TileRequest> requests;                            ///< most urgent first
+        std::span<const TileId> planned_heights, planned_textures;    ///< never evicted
+        std::span<const TileId> standing_heights, standing_textures;  ///< evicted last
+        std::span<const TileRequest> requests;                        ///< most urgent first
     };
     /// Once a frame, after selection. Requests not begun and no longer wished for are cancelled.
     void request(const Wishes& wishes);

@@ -1,6 +1,6 @@
-// TileCache: which tiles of one kind hold which slots. Fixed capacity; a slot is reserved when its tile is requested, so
-// nothing is loaded that could not be kept. Least recently used goes first; pinned, planned and loading tiles never go.
-// Frame-loop thread only.
+// TileCache: which tiles of one kind hold which slots. Fixed capacity; a slot is reserved when its tile is requested,
+// so nothing is loaded that could not be kept. Least recently used goes first; pinned, planned and loading tiles never
+// go. Frame-loop thread only.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@ public:
     enum class State { loading, resident, unavailable };
     struct Entry {
         State state = State::loading;
-        std::int32_t slot = -1;  ///< -1 when unavailable
+        std::int32_t slot = -1;        ///< -1 when unavailable
         std::uint64_t planned_in = 0;  ///< frame in which it was last planned
         bool pinned = false;
         HeightTileHeader header;  ///< of a texture tile only the child bits
@@ -30,8 +30,8 @@ public:
     explicit TileCache(std::int64_t capacity);
 
     const Entry* find(TileId id) const;
-    /// Marks tiles as planned in this frame (most recently used, not to be evicted in it). The first of the list becomes the
-    /// most recent: give parents before children, and children go first.
+    /// Marks tiles as planned in this frame (most recently used, not to be evicted in it). The first of the list
+    /// becomes the most recent: give parents before children, and children go first.
     void touch_planned(std::span<const TileId> ids, std::uint64_t frame);
     /// Marks tiles as used, evictable; order as above.
     void touch(std::span<const TileId> ids);

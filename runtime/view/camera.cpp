@@ -29,7 +29,8 @@ Result<Camera> look_at(glm::dvec3 eye, glm::dvec3 target, double fov_deg, int wi
     if (width_px < 1 || height_px < 1 || width_px > 16384 || height_px > 16384)
         return Error{ErrorCode::usage, fmt::format("size {}x{} px is outside 1..16384", width_px, height_px)};
     glm::dvec3 direction = target - eye;
-    // Divided by its largest part first: the squares of very long and very short directions leave the range of a double.
+    // Divided by its largest part first: the squares of very long and very short directions leave the range of a
+    // double.
     const double largest = std::max({std::abs(direction.x), std::abs(direction.y), std::abs(direction.z)});
     if (!(largest > 0))
         return Error{ErrorCode::usage, "the camera's eye and look are the same point, so it has no direction"};

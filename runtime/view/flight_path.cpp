@@ -31,7 +31,8 @@ Result<FlightPath> key_poses(const TileStore& store) {
     const Lattice& l = d.lattice;
     auto ground = Ground::open(store);
     if (!ground) return ground.error();
-    const double width = static_cast<double>(l.cells_x) * l.spacing_m, depth = static_cast<double>(l.cells_y) * l.spacing_m;
+    const double width = static_cast<double>(l.cells_x) * l.spacing_m,
+                 depth = static_cast<double>(l.cells_y) * l.spacing_m;
     const double extent = std::max(width, depth);
     const glm::dvec3 west_south{l.x_m(0), l.y_m(static_cast<double>(l.cells_y)), 0};
     const auto at = [&](double u, double v) { return west_south + glm::dvec3(u * width, v * depth, 0); };
@@ -44,7 +45,8 @@ Result<FlightPath> key_poses(const TileStore& store) {
         double heading = 0, pitch = 0, above = 0;  // heading from east towards north
         if (t < 1) {
             pose.eye = at(0.2 + 0.5 * u, 0.25 + 0.4 * u + 0.05 * std::sin(4 * std::numbers::pi * u));
-            heading = std::atan2((0.4 + 0.2 * std::numbers::pi * std::cos(4 * std::numbers::pi * u)) * depth, 0.5 * width);
+            heading =
+                std::atan2((0.4 + 0.2 * std::numbers::pi * std::cos(4 * std::numbers::pi * u)) * depth, 0.5 * width);
             pitch = -4;
             above = std::max(0.004 * extent, 3 * l.spacing_m);
         } else if (t < 2) {
@@ -62,13 +64,15 @@ Result<FlightPath> key_poses(const TileStore& store) {
         double floor = d.min_height_m;
         for (int s = 0; s <= 8; ++s) {
             const double reach = s * 0.25 * above * 4;
-            auto height = ground_or_floor(**ground, d, pose.eye + glm::dvec3(std::cos(heading), std::sin(heading), 0) * reach);
+            auto height =
+                ground_or_floor(**ground, d, pose.eye + glm::dvec3(std::cos(heading), std::sin(heading), 0) * reach);
             if (!height) return height.error();
             floor = std::max(floor, *height);
         }
         pose.eye.z = floor + above;
-        pose.look = pose.eye + extent * 0.1 * glm::dvec3(std::cos(heading) * std::cos(radians(pitch)),
-                                                         std::sin(heading) * std::cos(radians(pitch)), std::sin(radians(pitch)));
+        pose.look = pose.eye + extent * 0.1 *
+                                   glm::dvec3(std::cos(heading) * std::cos(radians(pitch)),
+                                              std::sin(heading) * std::cos(radians(pitch)), std::sin(radians(pitch)));
         path.push_back(pose);
     }
     // The floor jumps from ridge to ridge: smooth the low part, never below it by more than the clearance allows.
@@ -109,7 +113,8 @@ Result<FlightPath> read_flight_path(const std::string& csv) {
             p = next + (k < 5 ? 1 : 0);
         }
         if (line.find_first_not_of(" \t\r", static_cast<std::size_t>(p - line.data())) != std::string::npos)
-            return Error{ErrorCode::input, fmt::format("{}: line {}: '{}' is more than six numbers", csv, number, line)};
+            return Error{ErrorCode::input,
+                         fmt::format("{}: line {}: '{}' is more than six numbers", csv, number, line)};
         path.push_back({{values[0], values[1], values[2]}, {values[3], values[4], values[5]}});
     }
     if (path.empty()) return Error{ErrorCode::input, fmt::format("{}: holds no pose", csv)};
@@ -124,15 +129,18 @@ FlightPath resample(const FlightPath& path, int frames) {
         const auto i = std::min(static_cast<std::size_t>(t), path.size() - 1);
         const std::size_t next = std::min(i + 1, path.size() - 1);
         const double w = t - static_cast<double>(i);
-        out.push_back({path[i].eye + (path[next].eye - path[i].eye) * w, path[i].look + (path[next].look - path[i].look) * w});
+        out.push_back(
+            {path[i].eye + (path[next].eye - path[i].eye) * w, path[i].look + (path[next].look - path[i].look) * w});
     }
     return out;
 }
 
 FlightPose overview(const Dataset& d, double fov_deg, double aspect) {
     const Lattice& l = d.lattice;
-    const double width = static_cast<double>(l.cells_x) * l.spacing_m, depth = static_cast<double>(l.cells_y) * l.spacing_m;
-    const glm::dvec3 middle{l.origin_x_m + width / 2, l.origin_y_m - depth / 2, 0.5 * (d.min_height_m + d.max_height_m)};
+    const double width = static_cast<double>(l.cells_x) * l.spacing_m,
+                 depth = static_cast<double>(l.cells_y) * l.spacing_m;
+    const glm::dvec3 middle{l.origin_x_m + width / 2, l.origin_y_m - depth / 2,
+                            0.5 * (d.min_height_m + d.max_height_m)};
     const double heading = radians(-65), pitch = radians(32);
     const glm::dvec3 back{std::cos(heading) * std::cos(pitch), std::sin(heading) * std::cos(pitch), std::sin(pitch)};
     const glm::dvec3 right = glm::normalize(glm::cross(-back, glm::dvec3(0, 0, 1))), up = glm::cross(right, -back);

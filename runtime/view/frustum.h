@@ -1,5 +1,6 @@
-// Frustum: the four side planes and the near plane of a camera, and the box test against them. A box is culled only when it
-// lies wholly behind one plane (far-most corner per plane; Scree lod, C18: corner tests lose tiles, this loses none).
+// Frustum: the four side planes and the near plane of a camera, and the box test against them. A box is culled only
+// when it lies wholly behind one plane (far-most corner per plane; Scree lod, C18: corner tests lose tiles, this loses
+// none).
 #pragma once
 
 #include <array>

@@ -10,7 +10,8 @@ namespace {
 constexpr std::size_t kRecentTiles = 32;
 }
 
-Ground::Ground(const TileStore& store, std::unique_ptr<TileReader> reader) : store_(store), reader_(std::move(reader)) {}
+Ground::Ground(const TileStore& store, std::unique_ptr<TileReader> reader)
+    : store_(store), reader_(std::move(reader)) {}
 
 Result<std::unique_ptr<Ground>> Ground::open(const TileStore& store) {
     auto reader = store.open_reader();
@@ -46,12 +47,14 @@ Result<std::optional<double>> Ground::height(double x_m, double y_m) {
     if (!(i >= 0 && j >= 0 && i <= static_cast<double>(l.cells_x) && j <= static_cast<double>(l.cells_y)))
         return std::optional<double>{};
     const std::int64_t m = l.tile_cells();
-    const auto ci = std::min(static_cast<std::int64_t>(i), l.cells_x - 1), cj = std::min(static_cast<std::int64_t>(j), l.cells_y - 1);
+    const auto ci = std::min(static_cast<std::int64_t>(i), l.cells_x - 1),
+               cj = std::min(static_cast<std::int64_t>(j), l.cells_y - 1);
     auto found = tile({l.deepest_level, ci / m, cj / m});
     if (!found) return found.error();
     if (*found == nullptr) return std::optional<double>{};
     const HeightTile& t = **found;
-    if (!t.presence.empty() && t.presence[static_cast<std::size_t>((cj % m) * m + ci % m)] == 0) return std::optional<double>{};
+    if (!t.presence.empty() && t.presence[static_cast<std::size_t>((cj % m) * m + ci % m)] == 0)
+        return std::optional<double>{};
     const double n = drawn_height_at(t.samples, l.tile_cells_log2, {0, 0}, i - static_cast<double>(ci / m * m),
                                      j - static_cast<double>(cj / m * m));
     return std::optional<double>{d.height_m(n)};

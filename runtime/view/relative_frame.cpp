@@ -8,7 +8,8 @@
 namespace scree {
 
 glm::vec3 RelativeFrame::position(std::int32_t i, std::int32_t j, float height_n) const {
-    return {static_cast<float>(i - i0) * spacing_m - fraction_m.x, static_cast<float>(j0 - j) * spacing_m - fraction_m.y,
+    return {static_cast<float>(i - i0) * spacing_m - fraction_m.x,
+            static_cast<float>(j0 - j) * spacing_m - fraction_m.y,
             (height_n - static_cast<float>(n0)) * quantum_m - fraction_m.z};
 }
 
@@ -23,7 +24,8 @@ RelativeFrame make_relative_frame(const Lattice& lattice, double height_offset_m
     frame.i0 = nearest(lattice.i_of(eye.x), 0, static_cast<double>(lattice.cells_x));
     frame.j0 = nearest(lattice.j_of(eye.y), 0, static_cast<double>(lattice.cells_y));
     frame.n0 = nearest((eye.z - height_offset_m) / height_quantum_m, -kMaxHeightUnits, kMaxHeightUnits);
-    frame.fraction_m = {static_cast<float>(eye.x - lattice.x_m(frame.i0)), static_cast<float>(eye.y - lattice.y_m(frame.j0)),
+    frame.fraction_m = {static_cast<float>(eye.x - lattice.x_m(frame.i0)),
+                        static_cast<float>(eye.y - lattice.y_m(frame.j0)),
                         static_cast<float>(eye.z - (height_offset_m + frame.n0 * height_quantum_m))};
     return frame;
 }

@@ -1,7 +1,8 @@
 // RelativeFrame: how lattice integers become camera-relative float positions, bit-identically from both sides of a tile
 // edge and in GLSL (runtime/render/shaders/terrain_position.glsl holds the same three lines):
 //     x = float(i - i0) * spacing - frac_x      one integer subtraction, one multiplication, one subtraction
-// (i0, j0, n0) is the lattice point nearest the eye, clamped to the dataset; frac is what is left of the eye, in metres.
+// (i0, j0, n0) is the lattice point nearest the eye, clamped to the dataset; frac is what is left of the eye, in
+// metres.
 #pragma once
 
 #include <cstdint>

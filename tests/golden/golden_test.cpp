@@ -1,7 +1,8 @@
-// Golden pictures: the whole way from a synthetic landscape to a PNG, compared with pictures that were looked at. Drivers round
-// differently, so a share of the pixels may differ a little. SCREE_UPDATE_GOLDEN=1 rewrites them: look before committing.
-#include <gtest/gtest.h>
+// Golden pictures: the whole way from a synthetic landscape to a PNG, compared with pictures that were looked at.
+// Drivers round differently, so a share of the pixels may differ a little. SCREE_UPDATE_GOLDEN=1 rewrites them: look
+// before committing.
 #include <fmt/format.h>
+#include <gtest/gtest.h>
 
 #include <unistd.h>
 
@@ -25,10 +26,12 @@ protected:
         folder_ = fs::temp_directory_path() / fmt::format("scree golden {}", ::getpid());
         fs::create_directories(folder_);
         const std::string scree = fmt::format("\"{}\"", SCREE_PROGRAM);
-        ready_ = run(fmt::format("{} synth -o \"{}\" --size 257 --spacing 80 --imagery-scale 4 --quiet", scree, folder_.string())) == 0 &&
-                 run(fmt::format("{} build \"{}/dem.tif\" --imagery \"{}/ortho.tif\" -o \"{}/image.scree\" --quiet", scree,
-                                 folder_.string(), folder_.string(), folder_.string())) == 0 &&
-                 run(fmt::format("{} build \"{}/dem.tif\" -o \"{}/tint.scree\" --quiet", scree, folder_.string(), folder_.string())) == 0;
+        ready_ = run(fmt::format("{} synth -o \"{}\" --size 257 --spacing 80 --imagery-scale 4 --quiet", scree,
+                                 folder_.string())) == 0 &&
+                 run(fmt::format("{} build \"{}/dem.tif\" --imagery \"{}/ortho.tif\" -o \"{}/image.scree\" --quiet",
+                                 scree, folder_.string(), folder_.string(), folder_.string())) == 0 &&
+                 run(fmt::format("{} build \"{}/dem.tif\" -o \"{}/tint.scree\" --quiet", scree, folder_.string(),
+                                 folder_.string())) == 0;
     }
     static void TearDownTestSuite() {
         std::error_code ignored;
@@ -40,10 +43,12 @@ protected:
         ASSERT_TRUE(ready_) << "synth or build failed";
         const fs::path golden = fs::path(SCREE_GOLDEN_FOLDER) / (name + ".png");
         const fs::path found = folder_ / (name + ".png");
-        const int status = run(fmt::format("LIBGL_ALWAYS_SOFTWARE=1 \"{}\" shot \"{}/{}.scree\" -o \"{}\" --size 320x200 {} > /dev/null",
-                                           SCREE_VIEW_PROGRAM, folder_.string(), store, found.string(), view));
+        const int status = run(
+            fmt::format("LIBGL_ALWAYS_SOFTWARE=1 \"{}\" shot \"{}/{}.scree\" -o \"{}\" --size 320x200 {} > /dev/null",
+                        SCREE_VIEW_PROGRAM, folder_.string(), store, found.string(), view));
         ASSERT_EQ(status, 0);
-        if (std::getenv("SCREE_UPDATE_GOLDEN") != nullptr) fs::copy_file(found, golden, fs::copy_options::overwrite_existing);
+        if (std::getenv("SCREE_UPDATE_GOLDEN") != nullptr)
+            fs::copy_file(found, golden, fs::copy_options::overwrite_existing);
         const fs::path difference = fs::path("golden_difference_" + name + ".png");
         const auto expected = load_png(golden);
         const auto actual = load_png(found);

@@ -15,10 +15,10 @@ void print_plan(const BuildPlan& plan) {
     const Dataset& d = plan.dataset;
     const Lattice& l = d.lattice;
     note("lattice: {} x {} cells of {} m, {} levels, {} x {} root{}{}\n", l.cells_x, l.cells_y, l.spacing_m,
-               l.deepest_level + 1, l.root_rows, l.root_columns, l.root_rows * l.root_columns == 1 ? "" : "s",
-               d.crs.empty() ? "" : ", " + d.crs);
+         l.deepest_level + 1, l.root_rows, l.root_columns, l.root_rows * l.root_columns == 1 ? "" : "s",
+         d.crs.empty() ? "" : ", " + d.crs);
     note("textures: {} levels, {} m a texel; memory: about {} MiB\n", d.texture_deepest_level + 1,
-               d.texel_m(d.texture_deepest_level), plan.memory_bytes >> 20);
+         d.texel_m(d.texture_deepest_level), plan.memory_bytes >> 20);
 }
 
 }  // namespace
@@ -30,15 +30,20 @@ int run_build(int argc, char** argv) {
     std::vector<std::string> dems, images;
     bool dry_run = false;
     app.add_option("DEM", dems, "Heights: GeoTIFF or any image; channel 1")->required()->expected(1, -1);
-    app.add_option("--imagery", images, "Colour image in the same CRS; its extent and resolution may differ")->expected(1, -1);
+    app.add_option("--imagery", images, "Colour image in the same CRS; its extent and resolution may differ")
+        ->expected(1, -1);
     app.add_option("-o,--output", options.out, "The store to write")->required();
     app.add_option("--spacing", options.spacing_m, "Metres between samples of a file without georeference");
-    app.add_option("--height-scale", options.height_scale, "z = value * scale + offset, in metres")->capture_default_str();
-    app.add_option("--height-offset", options.height_offset_m, "z = value * scale + offset, in metres")->capture_default_str();
-    app.add_option("--nodata", options.nodata, "A height value that means void, besides the file's own");
-    app.add_option("--tile-size", options.tile_size, "Samples along a height tile, 2^n + 1: larger means fewer, coarser choices")
+    app.add_option("--height-scale", options.height_scale, "z = value * scale + offset, in metres")
         ->capture_default_str();
-    app.add_option("--texture-size", options.texture_size, "Texels along a texture tile, a power of two")->capture_default_str();
+    app.add_option("--height-offset", options.height_offset_m, "z = value * scale + offset, in metres")
+        ->capture_default_str();
+    app.add_option("--nodata", options.nodata, "A height value that means void, besides the file's own");
+    app.add_option("--tile-size", options.tile_size,
+                   "Samples along a height tile, 2^n + 1: larger means fewer, coarser choices")
+        ->capture_default_str();
+    app.add_option("--texture-size", options.texture_size, "Texels along a texture tile, a power of two")
+        ->capture_default_str();
     app.add_option("--height-quantum", options.height_quantum_m,
                    "Metres of the height unit; default: the source's own for integers, 1/64 m otherwise");
     app.add_option("--threads", options.threads, "0: one a core")->capture_default_str()->check(CLI::Range(0, 1024));
@@ -54,12 +59,14 @@ int run_build(int argc, char** argv) {
         return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorCode::usage);
     }
     if (dems.size() != 1 || images.size() > 1)
-        return report_error("scree build", {ErrorCode::usage, "one DEM and at most one image for now; mosaics come later"});
+        return report_error("scree build",
+                            {ErrorCode::usage, "one DEM and at most one image for now; mosaics come later"});
     options.dem = dems.front();
     if (!images.empty()) options.imagery = images.front();
     const auto bytes = parse_bytes(memory);
     if (!bytes)
-        return report_error("scree build", {ErrorCode::usage, fmt::format("--memory {} is not a size such as 256M", memory)});
+        return report_error("scree build",
+                            {ErrorCode::usage, fmt::format("--memory {} is not a size such as 256M", memory)});
     options.memory_bytes = *bytes;
 
     install_interrupt_handler();
@@ -73,8 +80,8 @@ int run_build(int argc, char** argv) {
     if (!report) return report_error("scree build", report.error());
     if (!options.quiet)
         note("{}: {:.1f} MB, {} height tiles, {} texture tiles; {:.1f} s, {:.1f} CPU s, peak {} MiB\n", options.out,
-                   static_cast<double>(report->store_bytes) / 1e6, report->height_tiles, report->texture_tiles, report->seconds,
-                   report->cpu_seconds, report->peak_rss_bytes >> 20);
+             static_cast<double>(report->store_bytes) / 1e6, report->height_tiles, report->texture_tiles,
+             report->seconds, report->cpu_seconds, report->peak_rss_bytes >> 20);
     if (json.empty()) return 0;
     const nlohmann::ordered_json out = {{"seconds", report->seconds},
                                         {"cpu_seconds", report->cpu_seconds},

@@ -30,7 +30,8 @@ std::string dds_of(const TextureTile& tile, int size_log2) {
     std::vector<std::uint8_t> bytes;
     ByteWriter out(bytes);
     const std::uint32_t size = 1u << size_log2;
-    constexpr std::uint32_t kCaps = 1, kHeight = 2, kWidth = 4, kPixelFormat = 0x1000, kMipCount = 0x20000, kLinearSize = 0x80000;
+    constexpr std::uint32_t kCaps = 1, kHeight = 2, kWidth = 4, kPixelFormat = 0x1000, kMipCount = 0x20000,
+                            kLinearSize = 0x80000;
     constexpr std::uint32_t kFourCc = 4, kTexture = 0x1000, kComplex = 8, kMipMap = 0x400000;
     out.u32(0x20534444);  // "DDS "
     out.u32(124);
@@ -83,15 +84,15 @@ int run_export(int argc, char** argv) {
     auto found = (*reader)->read(TileKind::texture, *id, row);
     if (!found) return report_error("scree export", found.error());
     if (!*found)
-        return report_error("scree export",
-                            {ErrorCode::input, fmt::format("{}: no texture tile {}; levels are 0..{}", path, texture,
-                                                           d.texture_deepest_level)});
+        return report_error("scree export", {ErrorCode::input, fmt::format("{}: no texture tile {}; levels are 0..{}",
+                                                                           path, texture, d.texture_deepest_level)});
     auto tile = read_texture_tile(**reader, d, *id);
     if (!tile) return report_error("scree export", tile.error());
     const std::string dds = dds_of(*tile, d.texture_size_log2);
     if (auto ok = write_text(out, dds); !ok) return report_error("scree export", ok.error());
     if (!json.empty()) {
-        const std::string text = fmt::format("{{\n  \"bytes\": {},\n  \"size_px\": {}\n}}\n", dds.size(), d.texture_size());
+        const std::string text =
+            fmt::format("{{\n  \"bytes\": {},\n  \"size_px\": {}\n}}\n", dds.size(), d.texture_size());
         if (auto ok = write_text(json, text); !ok) return report_error("scree export", ok.error());
     }
     return 0;

@@ -37,18 +37,20 @@ int run_info(int argc, char** argv) {
     const auto cells_x = static_cast<double>(l.cells_x), cells_y = static_cast<double>(l.cells_y);
     if (json != "-") {
         fmt::print("{}: Scree store, format {}\n", path, kFormatVersion);
-        fmt::print("  CRS        {}{}\n", d.crs.empty() ? "none" : d.crs, d.crs_name.empty() ? "" : " (" + d.crs_name + ")");
+        fmt::print("  CRS        {}{}\n", d.crs.empty() ? "none" : d.crs,
+                   d.crs_name.empty() ? "" : " (" + d.crs_name + ")");
         fmt::print("  datum      {}\n", d.vertical_datum.empty() ? "not stated" : d.vertical_datum);
         fmt::print("  extent     x {} .. {}, y {} .. {} m\n", l.x_m(0), l.x_m(cells_x), l.y_m(cells_y), l.y_m(0));
         fmt::print("  lattice    {} x {} cells of {} m, {} levels, {} x {} roots\n", l.cells_x, l.cells_y, l.spacing_m,
                    l.deepest_level + 1, l.root_rows, l.root_columns);
-        fmt::print("  heights    {} .. {} m in steps of {} m (error {} m), {} tiles of {}^2\n", d.min_height_m, d.max_height_m,
-                   d.height_quantum_m, d.height_quantum_error_m, contents->height_rows, l.tile_samples());
+        fmt::print("  heights    {} .. {} m in steps of {} m (error {} m), {} tiles of {}^2\n", d.min_height_m,
+                   d.max_height_m, d.height_quantum_m, d.height_quantum_error_m, contents->height_rows,
+                   l.tile_samples());
         fmt::print("  textures   {} levels of {}^2, finest texel {} m, {} tiles, {}\n", d.texture_deepest_level + 1,
                    d.texture_size(), d.texel_m(d.texture_deepest_level), contents->texture_rows,
                    d.has_imagery ? "imagery" : "tint");
-        fmt::print("  bytes      {} in the file: {} heights, {} textures\n", contents->file_bytes, contents->height_bytes,
-                   contents->texture_bytes);
+        fmt::print("  bytes      {} in the file: {} heights, {} textures\n", contents->file_bytes,
+                   contents->height_bytes, contents->texture_bytes);
         for (const SourceRecord& s : d.sources)
             fmt::print("  source     {} ({}, {} x {}, {} bytes)\n", s.name, s.role, s.width, s.height, s.bytes);
         if (!d.attribution.empty()) fmt::print("  credit     {}\n", d.attribution);
@@ -57,7 +59,8 @@ int run_info(int argc, char** argv) {
     if (json.empty()) return 0;
     nlohmann::ordered_json sources = nlohmann::ordered_json::array();
     for (const SourceRecord& s : d.sources)
-        sources.push_back({{"name", s.name}, {"role", s.role}, {"bytes", s.bytes}, {"width", s.width}, {"height", s.height}});
+        sources.push_back(
+            {{"name", s.name}, {"role", s.role}, {"bytes", s.bytes}, {"width", s.width}, {"height", s.height}});
     const nlohmann::ordered_json out = {
         {"format_version", kFormatVersion},
         {"crs", d.crs},
@@ -84,7 +87,8 @@ int run_info(int argc, char** argv) {
         {"sources", sources},
         {"attribution", d.attribution},
         {"digest", digest}};
-    if (auto ok = write_text(json, out.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n"); !ok)
+    if (auto ok = write_text(json, out.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+        !ok)
         return report_error("scree info", ok.error());
     return 0;
 }

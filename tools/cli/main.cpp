@@ -32,8 +32,9 @@ constexpr std::array<Command, 5> kCommands{{
 void print_help() {
     fmt::print("scree {}: terrain pyramids for scree-view\n\nUsage: scree COMMAND [OPTIONS]\n\n", SCREE_VERSION);
     for (const Command& c : kCommands) fmt::print("  {:<8} {}\n", c.name, c.summary);
-    fmt::print("\nscree COMMAND --help tells more. Exit codes: 0 done, 1 a check failed, 2 usage, 3 input, 4 store, 5 I/O, "
-               "130 interrupted.\n");
+    fmt::print(
+        "\nscree COMMAND --help tells more. Exit codes: 0 done, 1 a check failed, 2 usage, 3 input, 4 store, 5 I/O, "
+        "130 interrupted.\n");
 }
 
 }  // namespace

@@ -14,10 +14,11 @@ namespace {
 
 std::string json_of(const SynthOptions& options, const SynthReport& report) {
     nlohmann::ordered_json json;
-    json["dem"] = {{"path", report.dem_path}, {"samples", report.dem_samples}, {"spacing_m", options.spacing_m},
+    json["dem"] = {{"path", report.dem_path},     {"samples", report.dem_samples}, {"spacing_m", options.spacing_m},
                    {"lowest_m", report.lowest_m}, {"highest_m", report.highest_m}, {"seconds", report.dem_seconds}};
     if (!report.ortho_path.empty())
-        json["ortho"] = {{"path", report.ortho_path}, {"pixels", report.ortho_pixels}, {"seconds", report.ortho_seconds}};
+        json["ortho"] = {
+            {"path", report.ortho_path}, {"pixels", report.ortho_pixels}, {"seconds", report.ortho_seconds}};
     json["seed"] = options.seed;
     json["bytes"] = report.bytes;
     return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
@@ -64,13 +65,14 @@ int run_synth(int argc, char** argv) {
     progress.finish();
     if (!quiet) {
         note("{}: {} x {} samples, {:.0f} to {:.0f} m, {:.1f} s\n", report->dem_path, report->dem_samples,
-                   report->dem_samples, report->lowest_m, report->highest_m, report->dem_seconds);
+             report->dem_samples, report->lowest_m, report->highest_m, report->dem_seconds);
         if (!report->ortho_path.empty())
-            note("{}: {} x {} pixels, {:.1f} s\n", report->ortho_path, report->ortho_pixels,
-                       report->ortho_pixels, report->ortho_seconds);
+            note("{}: {} x {} pixels, {:.1f} s\n", report->ortho_path, report->ortho_pixels, report->ortho_pixels,
+                 report->ortho_seconds);
     }
     if (!json_target.empty())
-        if (auto ok = write_text(json_target, json_of(options, *report)); !ok) return report_error("scree synth", ok.error());
+        if (auto ok = write_text(json_target, json_of(options, *report)); !ok)
+            return report_error("scree synth", ok.error());
     return 0;
 }
 

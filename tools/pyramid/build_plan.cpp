@@ -17,24 +17,26 @@ namespace {
 
 // Measured on Debian 12: OpenImageIO and the libraries behind it, loaded and idle, with the program and SQLite's cache.
 constexpr std::int64_t kProcessBytes = std::int64_t{150} << 20;
-constexpr double kSquareTolerance = 1e-4;   // relative difference of pixel width and height
-constexpr double kTexelTolerance = 1.1;     // a texel may be this much coarser than a source pixel
+constexpr double kSquareTolerance = 1e-4;  // relative difference of pixel width and height
+constexpr double kTexelTolerance = 1.1;    // a texel may be this much coarser than a source pixel
 
 Error input_error(std::string message) { return {ErrorCode::input, std::move(message)}; }
 Error usage_error(std::string message) { return {ErrorCode::usage, std::move(message)}; }
 
 Result<void> check_usable(const std::string& path, const Georeference& where) {
     if (where.geographic)
-        return input_error(fmt::format("{}: coordinates are degrees ({}); heights in degrees cannot be built until warping "
-                                       "exists: reproject to a metric CRS such as UTM first",
-                                       path, where.crs.empty() ? "geographic CRS" : where.crs));
+        return input_error(
+            fmt::format("{}: coordinates are degrees ({}); heights in degrees cannot be built until warping "
+                        "exists: reproject to a metric CRS such as UTM first",
+                        path, where.crs.empty() ? "geographic CRS" : where.crs));
     if (where.rotated)
-        return input_error(fmt::format("{}: the raster is rotated against its CRS; this needs warping, which does not exist yet",
-                                       path));
+        return input_error(fmt::format(
+            "{}: the raster is rotated against its CRS; this needs warping, which does not exist yet", path));
     if (where.step_y > 0 || where.step_x < 0)
-        return input_error(fmt::format("{}: rows do not run from north to south (steps {}, {}); this needs warping, which does "
-                                       "not exist yet",
-                                       path, where.step_x, where.step_y));
+        return input_error(
+            fmt::format("{}: rows do not run from north to south (steps {}, {}); this needs warping, which does "
+                        "not exist yet",
+                        path, where.step_x, where.step_y));
     if (std::abs(where.linear_unit_m - 1) > 1e-9)
         return input_error(fmt::format("{}: CRS units of {} m; only metres can be built until warping exists", path,
                                        where.linear_unit_m));
@@ -43,8 +45,9 @@ Result<void> check_usable(const std::string& path, const Georeference& where) {
 
 Result<void> check_square(const std::string& path, const Georeference& where) {
     if (std::abs(where.step_x + where.step_y) > kSquareTolerance * where.step_x)
-        return input_error(fmt::format("{}: cells of {} x {} m are not square; this needs warping, which does not exist yet",
-                                       path, where.step_x, -where.step_y));
+        return input_error(
+            fmt::format("{}: cells of {} x {} m are not square; this needs warping, which does not exist yet", path,
+                        where.step_x, -where.step_y));
     return {};
 }
 
@@ -57,20 +60,23 @@ Result<int> log2_of(int value, int minimum_log2, int maximum_log2, const char* o
 Result<Lattice> plan_lattice(const BuildOptions& o, const ImageSource& dem, int tile_cells_log2) {
     const ImageInfo& info = dem.info();
     if (info.width < 2 || info.height < 2)
-        return input_error(fmt::format("{}: {} x {} samples; a terrain needs at least 2 x 2", o.dem, info.width, info.height));
+        return input_error(
+            fmt::format("{}: {} x {} samples; a terrain needs at least 2 x 2", o.dem, info.width, info.height));
     if (!dem.georeference()) {
         const double spacing = o.spacing_m.value_or(0);
         if (!o.spacing_m)
-            return input_error(fmt::format("{}: the file carries no georeference; give the distance of its samples in metres "
-                                           "with --spacing",
-                                           o.dem));
+            return input_error(
+                fmt::format("{}: the file carries no georeference; give the distance of its samples in metres "
+                            "with --spacing",
+                            o.dem));
         // Samples are points and the north-west one stands at (0, 0); y falls southward.
         return make_lattice(0, 0, spacing, info.width - 1, info.height - 1, tile_cells_log2);
     }
     const Georeference& where = *dem.georeference();
     if (o.spacing_m)
-        return usage_error(fmt::format("--spacing {}: {} carries its own georeference ({} m); the option is for files without",
-                                       *o.spacing_m, o.dem, where.step_x));
+        return usage_error(
+            fmt::format("--spacing {}: {} carries its own georeference ({} m); the option is for files without",
+                        *o.spacing_m, o.dem, where.step_x));
     if (auto ok = check_usable(o.dem, where); !ok) return ok.error();
     if (auto ok = check_square(o.dem, where); !ok) return ok.error();
     return make_lattice(where.first_x, where.first_y, where.step_x, info.width - 1, info.height - 1, tile_cells_log2);
@@ -83,7 +89,8 @@ Result<void> plan_imagery(const BuildOptions& o, BuildPlan& plan) {
     const auto& where = plan.imagery->georeference();
     if (dem_where.has_value() != where.has_value())
         return input_error(fmt::format("{} {} georeference and {} {}: either both or neither", o.dem,
-                                       dem_where ? "carries a" : "carries no", *o.imagery, where ? "does" : "does not"));
+                                       dem_where ? "carries a" : "carries no", *o.imagery,
+                                       where ? "does" : "does not"));
     if (!where) {
         Georeference covering;  // the image covers the samples' extent edge to edge
         covering.step_x = static_cast<double>(lattice.cells_x) * lattice.spacing_m / static_cast<double>(info.width);
@@ -96,22 +103,23 @@ Result<void> plan_imagery(const BuildOptions& o, BuildPlan& plan) {
     if (auto ok = check_usable(*o.imagery, *where); !ok) return ok;
     if (auto ok = check_square(*o.imagery, *where); !ok) return ok;
     if (!where->crs.empty() && !dem_where->crs.empty() && where->crs != dem_where->crs)
-        return input_error(fmt::format("{} is in {}, {} in {}: both must be in one CRS until warping exists", *o.imagery,
-                                       where->crs, o.dem, dem_where->crs));
+        return input_error(fmt::format("{} is in {}, {} in {}: both must be in one CRS until warping exists",
+                                       *o.imagery, where->crs, o.dem, dem_where->crs));
     const double west = where->first_x - where->step_x / 2, north = where->first_y - where->step_y / 2;
     const double east = west + static_cast<double>(info.width) * where->step_x;
     const double south = north + static_cast<double>(info.height) * where->step_y;
     const auto cells_x = static_cast<double>(lattice.cells_x), cells_y = static_cast<double>(lattice.cells_y);
-    if (east <= lattice.x_m(0) || west >= lattice.x_m(cells_x) || north <= lattice.y_m(cells_y) || south >= lattice.y_m(0))
-        return input_error(fmt::format("{} (x {}..{}, y {}..{}) does not meet {} (x {}..{}, y {}..{})", *o.imagery, west, east,
-                                       south, north, o.dem, lattice.x_m(0), lattice.x_m(cells_x), lattice.y_m(cells_y),
-                                       lattice.y_m(0)));
+    if (east <= lattice.x_m(0) || west >= lattice.x_m(cells_x) || north <= lattice.y_m(cells_y) ||
+        south >= lattice.y_m(0))
+        return input_error(fmt::format("{} (x {}..{}, y {}..{}) does not meet {} (x {}..{}, y {}..{})", *o.imagery,
+                                       west, east, south, north, o.dem, lattice.x_m(0), lattice.x_m(cells_x),
+                                       lattice.y_m(cells_y), lattice.y_m(0)));
     plan.imagery_where = *where;
     return {};
 }
 
-// The smallest level whose texel is no more than 1.1 source pixels; and never coarser than a texel a cell, because alpha
-// says where heights end.
+// The smallest level whose texel is no more than 1.1 source pixels; and never coarser than a texel a cell, because
+// alpha says where heights end.
 int texture_depth(const Dataset& dataset, double source_texel_m) {
     const double wanted = std::min(kTexelTolerance * source_texel_m, dataset.lattice.spacing_m * (1 + 1e-9));
     int level = 0;
@@ -124,7 +132,9 @@ void plan_resources(const BuildOptions& o, BuildPlan& plan) {
     const ImageInfo& dem = plan.dem->info();
     const std::int64_t heights = height_pyramid_bytes(d.lattice) + 2 * dem.unit_bytes + dem.width * 32 * 8;
     std::int64_t texture = TexturePyramid::bytes_needed(d.lattice, d.texture_size_log2, d.texture_deepest_level);
-    const std::int64_t texels_wide = d.lattice.cells_x * static_cast<std::int64_t>(std::ceil(d.lattice.spacing_m / d.texel_m(d.texture_deepest_level)));
+    const std::int64_t texels_wide =
+        d.lattice.cells_x *
+        static_cast<std::int64_t>(std::ceil(d.lattice.spacing_m / d.texel_m(d.texture_deepest_level)));
     if (plan.imagery) texture += ImageryRows::bytes_needed(plan.imagery->info(), texels_wide);
     plan.memory_bytes = kProcessBytes + std::max(heights, texture);
     plan.temporary_bytes = HeightSpool::bytes_needed(dem.width, dem.height, !fits_float32(dem.type));
@@ -138,24 +148,25 @@ void plan_resources(const BuildOptions& o, BuildPlan& plan) {
         if (level <= d.texture_deepest_level) texture_tiles += tiles;
     }
     const double samples = d.lattice.tile_samples() * d.lattice.tile_samples();
-    plan.store_bytes_estimate = static_cast<std::int64_t>(
-        height_tiles * (samples * 2 + 200) + texture_tiles * static_cast<double>(bc1_chain_bytes(d.texture_size_log2)) * 1.02);
+    plan.store_bytes_estimate =
+        static_cast<std::int64_t>(height_tiles * (samples * 2 + 200) +
+                                  texture_tiles * static_cast<double>(bc1_chain_bytes(d.texture_size_log2)) * 1.02);
     (void)o;
 }
 
 SourceRecord source_record(const std::string& path, const char* role, const ImageInfo& info) {
     std::error_code error;
     const auto bytes = std::filesystem::file_size(path, error);
-    return {std::filesystem::path(path).filename().string(), role, error ? 0 : static_cast<std::int64_t>(bytes), info.width,
-            info.height};
+    return {std::filesystem::path(path).filename().string(), role, error ? 0 : static_cast<std::int64_t>(bytes),
+            info.width, info.height};
 }
 
 }  // namespace
 
 Result<BuildPlan> plan_build(const BuildOptions& o) {
     if (o.memory_bytes < kMinMemoryBytes)
-        return usage_error(fmt::format("--memory {} MiB is below the minimum of {} MiB", o.memory_bytes >> 20,
-                                       kMinMemoryBytes >> 20));
+        return usage_error(
+            fmt::format("--memory {} MiB is below the minimum of {} MiB", o.memory_bytes >> 20, kMinMemoryBytes >> 20));
     if (!(std::isfinite(o.height_scale) && o.height_scale > 0))
         return usage_error(fmt::format("--height-scale {} is not a positive number", o.height_scale));
     if (!(std::abs(o.height_offset_m) <= 1e7))
@@ -167,8 +178,9 @@ Result<BuildPlan> plan_build(const BuildOptions& o) {
     auto tile_log2 = log2_of(o.tile_size - 1, kMinTileCellsLog2, kMaxTileCellsLog2,
                              fmt::format("--tile-size {}", o.tile_size).c_str(), "5, 9, 17, 33, 65, 129, 257");
     if (!tile_log2) return tile_log2.error();
-    auto texture_log2 = log2_of(o.texture_size, kMinTextureSizeLog2, kMaxTextureSizeLog2,
-                                fmt::format("--texture-size {}", o.texture_size).c_str(), "16, 32, 64, 128, 256, 512, 1024, 2048");
+    auto texture_log2 =
+        log2_of(o.texture_size, kMinTextureSizeLog2, kMaxTextureSizeLog2,
+                fmt::format("--texture-size {}", o.texture_size).c_str(), "16, 32, 64, 128, 256, 512, 1024, 2048");
     if (!texture_log2) return texture_log2.error();
 
     BuildPlan plan;
@@ -203,8 +215,8 @@ Result<BuildPlan> plan_build(const BuildOptions& o) {
     }
     d.texture_deepest_level = texture_depth(d, source_texel);
     if (!tile_key(d.lattice, {d.texture_deepest_level, 0, 0}))
-        return input_error(fmt::format("imagery of {} m a pixel needs texture level {}, beyond the format's keys", source_texel,
-                                       d.texture_deepest_level));
+        return input_error(fmt::format("imagery of {} m a pixel needs texture level {}, beyond the format's keys",
+                                       source_texel, d.texture_deepest_level));
     plan_resources(o, plan);
     if (plan.memory_bytes > o.memory_bytes)
         return usage_error(fmt::format("--memory {} MiB is not enough for these widths: {} MiB are needed",

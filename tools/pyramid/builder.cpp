@@ -20,8 +20,8 @@
 #include <memory>
 #include <thread>
 
-#include "common/report.h"
 #include "common/process_usage.h"
+#include "common/report.h"
 #include "tools/progress.h"
 #include "tools/pyramid/height_pyramid.h"
 #include "tools/pyramid/height_spool.h"
@@ -34,8 +34,8 @@ namespace {
 
 constexpr std::int64_t kSpoolBandRows = 16;
 
-// The file that grows under OUT.partial: locked, so that two builds of one store cannot meet in it, and removed unless it was
-// given its final name.
+// The file that grows under OUT.partial: locked, so that two builds of one store cannot meet in it, and removed unless
+// it was given its final name.
 class PartialFile {
 public:
     static Result<std::unique_ptr<PartialFile>> create(const std::string& path) {
@@ -48,9 +48,11 @@ public:
                 return Error{ErrorCode::usage, fmt::format("{}: another build is writing it", path)};
             }
             // The file may have been renamed or removed between opening and locking.
-            struct stat held {}, named {};
+            struct stat held {
+            }, named{};
             if (::fstat(fd, &held) == 0 && ::stat(path.c_str(), &named) == 0 && held.st_ino == named.st_ino) {
-                if (::ftruncate(fd, 0) != 0) return Error{ErrorCode::io, fmt::format("{}: {}", path, std::strerror(errno))};
+                if (::ftruncate(fd, 0) != 0)
+                    return Error{ErrorCode::io, fmt::format("{}: {}", path, std::strerror(errno))};
                 return file;
             }
             file->kept_ = true;
@@ -66,7 +68,8 @@ public:
 
     Result<void> rename_to(const std::string& final_path) {
         if (std::rename(path_.c_str(), final_path.c_str()) != 0)
-            return Error{ErrorCode::io, fmt::format("{}: cannot rename to {}: {}", path_, final_path, std::strerror(errno))};
+            return Error{ErrorCode::io,
+                         fmt::format("{}: cannot rename to {}: {}", path_, final_path, std::strerror(errno))};
         kept_ = true;
         std::error_code ignored;
         const std::string folder = std::filesystem::absolute(final_path, ignored).parent_path().string();
@@ -92,7 +95,8 @@ struct VoidRule {
     std::optional<double> tag, user;
     void apply(std::span<double> row) const {
         for (double& v : row)
-            if (!std::isfinite(v) || (tag && v == *tag) || (user && v == *user)) v = std::numeric_limits<double>::quiet_NaN();
+            if (!std::isfinite(v) || (tag && v == *tag) || (user && v == *user))
+                v = std::numeric_limits<double>::quiet_NaN();
     }
 };
 
@@ -162,13 +166,13 @@ private:
 };
 
 // Imagery where there is any, tint elsewhere, nothing over absent cells.
-void compose_row(const CellRows& cells, const Lattice& lattice, double cells_per_texel, std::int64_t width, bool imagery,
-                 std::uint8_t* texels) {
+void compose_row(const CellRows& cells, const Lattice& lattice, double cells_per_texel, std::int64_t width,
+                 bool imagery, std::uint8_t* texels) {
     const std::uint8_t* present = cells.present();
     const std::uint8_t* tint = cells.tint();
     const auto per_cell = static_cast<std::int64_t>(std::llround(1 / std::min(cells_per_texel, 1.0)));
     std::int64_t c = 0;
-    for (std::int64_t cell = 0; cell < lattice.cells_x && c < width; ) {
+    for (std::int64_t cell = 0; cell < lattice.cells_x && c < width;) {
         const std::int64_t run = std::min(per_cell, width - c);
         if (present[cell] == 0) {
             std::memset(texels + 4 * c, 0, static_cast<std::size_t>(4 * run));
@@ -205,10 +209,12 @@ Result<std::int64_t> build_textures(TextureStage& s) {
     double pixels_per_row = 0;
     if (s.plan.imagery) {
         const double texel = d.texel_m(d.texture_deepest_level);
-        imagery.emplace(*s.plan.imagery, s.plan.imagery_where,
-                        TexelGrid{lattice.origin_x_m + texel / 2, lattice.origin_y_m - texel / 2, texel, pyramid.width()});
+        imagery.emplace(
+            *s.plan.imagery, s.plan.imagery_where,
+            TexelGrid{lattice.origin_x_m + texel / 2, lattice.origin_y_m - texel / 2, texel, pyramid.width()});
         const ImageInfo& info = s.plan.imagery->info();
-        pixels_per_row = static_cast<double>(info.width) * static_cast<double>(info.height) / static_cast<double>(pyramid.height());
+        pixels_per_row =
+            static_cast<double>(info.width) * static_cast<double>(info.height) / static_cast<double>(pyramid.height());
     }
     CellRows cells(s.spool, s.quantizer, {d.min_height_m, d.max_height_m, lattice.spacing_m});
     const std::int64_t row_bytes = pyramid.width() * 4;
@@ -222,7 +228,8 @@ Result<std::int64_t> build_textures(TextureStage& s) {
                 continue;
             }
             if (imagery)
-                if (auto ok = imagery->sample(r + k, {texels, static_cast<std::size_t>(row_bytes)}); !ok) return ok.error();
+                if (auto ok = imagery->sample(r + k, {texels, static_cast<std::size_t>(row_bytes)}); !ok)
+                    return ok.error();
             if (auto ok = cells.move_to(cell_row); !ok) return ok.error();
             compose_row(cells, lattice, cells_per_texel, pyramid.width(), imagery.has_value(), texels);
         }
@@ -238,7 +245,8 @@ Result<void> announce_build(const BuildPlan& plan, const BuildOptions& options) 
     std::error_code error;
     for (const std::string* input : {&options.dem, options.imagery ? &*options.imagery : nullptr})
         if (input != nullptr && std::filesystem::equivalent(*input, options.out, error))
-            return Error{ErrorCode::usage, fmt::format("{}: is an input, and the output would replace it", options.out)};
+            return Error{ErrorCode::usage,
+                         fmt::format("{}: is an input, and the output would replace it", options.out)};
     if (std::filesystem::exists(options.out, error) && !options.force)
         return Error{ErrorCode::usage, fmt::format("{}: exists; --force replaces it", options.out)};
     const auto folder = std::filesystem::absolute(options.out, error).parent_path();
@@ -249,8 +257,8 @@ Result<void> announce_build(const BuildPlan& plan, const BuildOptions& options) 
     const double needed = static_cast<double>(plan.temporary_bytes + plan.store_bytes_estimate);
     if (!options.quiet)
         note("disk: up to {:.1f} MB for the store and {:.1f} MB while building; {:.0f} MB are free\n",
-                   static_cast<double>(plan.store_bytes_estimate) / 1e6, static_cast<double>(plan.temporary_bytes) / 1e6,
-                   free_bytes / 1e6);
+             static_cast<double>(plan.store_bytes_estimate) / 1e6, static_cast<double>(plan.temporary_bytes) / 1e6,
+             free_bytes / 1e6);
     if (needed > free_bytes)
         return Error{ErrorCode::io, fmt::format("{}: {:.0f} MB may be needed and {:.0f} MB are free", folder.string(),
                                                 needed / 1e6, free_bytes / 1e6)};
@@ -259,14 +267,16 @@ Result<void> announce_build(const BuildPlan& plan, const BuildOptions& options) 
 
 Result<BuildReport> build_store(BuildPlan plan, const BuildOptions& options, const std::atomic<bool>& stop) {
     const auto start = std::chrono::steady_clock::now();
-    const int threads = options.threads > 0 ? options.threads : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+    const int threads =
+        options.threads > 0 ? options.threads : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
     Dataset& d = plan.dataset;
     const ImageInfo dem = plan.dem->info();
     const double dem_pixels = static_cast<double>(dem.width) * static_cast<double>(dem.height) / 1e6;
     double image_pixels = 0;
     if (plan.imagery)
-        image_pixels = static_cast<double>(plan.imagery->info().width) * static_cast<double>(plan.imagery->info().height) / 1e6;
+        image_pixels =
+            static_cast<double>(plan.imagery->info().width) * static_cast<double>(plan.imagery->info().height) / 1e6;
 
     auto partial = PartialFile::create(options.out + ".partial");
     if (!partial) return partial.error();
@@ -290,7 +300,8 @@ Result<BuildReport> build_store(BuildPlan plan, const BuildOptions& options, con
                                          }});
     if (!heights) return heights.error().code == ErrorCode::interrupted ? interrupted() : heights.error();
     if (heights->tile_count == 0)
-        return Error{ErrorCode::input, fmt::format("{}: no cell has four valid corners: there is nothing to build", options.dem)};
+        return Error{ErrorCode::input,
+                     fmt::format("{}: no cell has four valid corners: there is nothing to build", options.dem)};
     d.height_offset_m = quantizer->height_offset_m;
     d.height_quantum_m = quantizer->quantum_m;
     d.height_quantum_error_m = heights->worst_quantum_error_m > 0 ? quantizer->quantum_m / 2 : 0;

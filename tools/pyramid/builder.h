@@ -1,5 +1,5 @@
-// The build: spool the heights, build the height pyramid, then the texture pyramid, into one file that gets its final name
-// only when it is complete (docs/architecture.md, "The builder").
+// The build: spool the heights, build the height pyramid, then the texture pyramid, into one file that gets its final
+// name only when it is complete (docs/architecture.md, "The builder").
 #pragma once
 
 #include <atomic>

@@ -53,19 +53,23 @@ struct ParentRecord {
 };
 
 struct LevelBand {
-    std::int64_t step = 1;     // finest cells from sample to sample
-    std::int64_t columns = 0;  // tiles
-    std::int64_t width = 0;    // samples in a row, columns * m + 1
-    std::int64_t band = 0;     // tile row being gathered
-    std::int64_t rows = 0;     // rows of the band already there
-    std::vector<std::int32_t> samples;   // (m + 1) rows
-    std::vector<ParentRecord> parents;   // by tile column
+    std::int64_t step = 1;              // finest cells from sample to sample
+    std::int64_t columns = 0;           // tiles
+    std::int64_t width = 0;             // samples in a row, columns * m + 1
+    std::int64_t band = 0;              // tile row being gathered
+    std::int64_t rows = 0;              // rows of the band already there
+    std::vector<std::int32_t> samples;  // (m + 1) rows
+    std::vector<ParentRecord> parents;  // by tile column
 };
 
 class Builder {
 public:
     explicit Builder(const HeightPyramidJob& job)
-        : job_(job), lattice_(job.lattice), m_(job.lattice.tile_cells()), n_(job.lattice.tile_cells_log2), corners_(job.lattice) {
+        : job_(job),
+          lattice_(job.lattice),
+          m_(job.lattice.tile_cells()),
+          n_(job.lattice.tile_cells_log2),
+          corners_(job.lattice) {
         result_.tiles = TileSet(lattice_, lattice_.deepest_level);
         result_.min_n = std::numeric_limits<std::int32_t>::max();
         result_.max_n = std::numeric_limits<std::int32_t>::min();
@@ -100,7 +104,8 @@ private:
             const std::int64_t j = std::min(r * m_, lattice_.cells_y);
             if (auto ok = job_.spool->read_row(j, raw_, valid); !ok) return ok;
             for (std::int64_t c = 0; c < corners_.columns(); ++c)
-                corners_.at(c, r) = job_.quantizer.quantize(raw_[static_cast<std::size_t>(std::min(c * m_, lattice_.cells_x))]);
+                corners_.at(c, r) =
+                    job_.quantizer.quantize(raw_[static_cast<std::size_t>(std::min(c * m_, lattice_.cells_x))]);
         }
         return {};
     }
@@ -110,7 +115,8 @@ private:
         LevelBand& deepest = levels_.back();
         std::uint8_t* valid = valid_.data() + deepest.rows * (lattice_.cells_x + 1);
         if (j <= lattice_.cells_y) {
-            if (auto ok = job_.spool->read_row(j, raw_, {valid, static_cast<std::size_t>(lattice_.cells_x + 1)}); !ok) return ok;
+            if (auto ok = job_.spool->read_row(j, raw_, {valid, static_cast<std::size_t>(lattice_.cells_x + 1)}); !ok)
+                return ok;
             quantize_row(valid);
             if (job_.on_rows && !job_.on_rows(j + 1)) return Error{ErrorCode::interrupted, "stopped"};
         } else {
@@ -134,18 +140,20 @@ private:
             if (valid[i] != 0) {
                 result_.min_n = std::min(result_.min_n, value);
                 result_.max_n = std::max(result_.max_n, value);
-                result_.worst_quantum_error_m =
-                    std::max(result_.worst_quantum_error_m, std::abs(q.metres(raw) - (q.height_offset_m + value * q.quantum_m)));
+                result_.worst_quantum_error_m = std::max(
+                    result_.worst_quantum_error_m, std::abs(q.metres(raw) - (q.height_offset_m + value * q.quantum_m)));
             }
         }
         std::fill(row_.begin() + width, row_.end(), row_[static_cast<std::size_t>(width - 1)]);
     }
 
-    // Appends the current row, subsampled, to a level's band; a full band is turned into tiles and its last row carried over.
+    // Appends the current row, subsampled, to a level's band; a full band is turned into tiles and its last row carried
+    // over.
     Result<void> append(int level, LevelBand& band) {
         std::int32_t* out = band.samples.data() + band.rows * band.width;
         const std::int64_t last = static_cast<std::int64_t>(row_.size()) - 1;
-        for (std::int64_t i = 0; i < band.width; ++i) out[i] = row_[static_cast<std::size_t>(std::min(i * band.step, last))];
+        for (std::int64_t i = 0; i < band.width; ++i)
+            out[i] = row_[static_cast<std::size_t>(std::min(i * band.step, last))];
         if (++band.rows <= m_) return {};
         auto ok = level == lattice_.deepest_level ? emit_deepest(band) : emit_coarser(level, band);
         if (!ok) return ok;
@@ -215,7 +223,8 @@ private:
             BlockVertices block{};
             for (std::int64_t k = 0; k < 9; ++k)
                 block[static_cast<std::size_t>(k)] = corners_.vertex(bi + k % 3 * stride, bj + k / 3 * stride);
-            record.ancestor_error[static_cast<std::size_t>(level)] = coarse_block_error(block, stride, i - bi, j - bj, finest);
+            record.ancestor_error[static_cast<std::size_t>(level)] =
+                coarse_block_error(block, stride, i - bi, j - bj, finest);
         }
         tile.header.own = record.bounds;
         record.payload = encode_height_tile(tile, n_, HeightCodec::plane);
@@ -235,7 +244,8 @@ private:
             for (int up = 0; up < level; ++up) {
                 ParentRecord& ancestor =
                     levels_[static_cast<std::size_t>(up)].parents[static_cast<std::size_t>(x >> (level - up))];
-                ancestor.coarsest_error = std::max(ancestor.coarsest_error, record.ancestor_error[static_cast<std::size_t>(up)]);
+                ancestor.coarsest_error =
+                    std::max(ancestor.coarsest_error, record.ancestor_error[static_cast<std::size_t>(up)]);
             }
             if (auto ok = store(id, record.bounds, record.payload); !ok) return ok;
         }
@@ -297,7 +307,8 @@ private:
             parent.child_mask = static_cast<std::uint8_t>(parent.child_mask | (1 << q));
             parent.children[static_cast<std::size_t>(q)] = bounds;
         }
-        return job_.writer->put(TileKind::height, *tile_key(lattice_, id), static_cast<int>(HeightCodec::plane), payload);
+        return job_.writer->put(TileKind::height, *tile_key(lattice_, id), static_cast<int>(HeightCodec::plane),
+                                payload);
     }
 
     const HeightPyramidJob& job_;
@@ -308,7 +319,7 @@ private:
     std::vector<LevelBand> levels_;
     std::vector<std::uint8_t> valid_;  // (m + 1) rows of the deepest band
     std::vector<double> raw_;
-    std::vector<std::int32_t> row_;    // current row, padded
+    std::vector<std::int32_t> row_;  // current row, padded
     HeightPyramidResult result_;
 };
 
@@ -319,7 +330,8 @@ std::int64_t height_pyramid_bytes(const Lattice& lattice) {
     const std::int64_t width = lattice.cells_x + 2 * m;
     const std::int64_t bands = 2 * (m + 1) * width * 4 + (m + 1) * width;
     const std::int64_t corners = (lattice.cells_x / m + 2) * (lattice.cells_y / m + 2) * 4;
-    const std::int64_t records = width / m * static_cast<std::int64_t>(sizeof(TileRecord) + 2 * sizeof(ParentRecord) + 4096);
+    const std::int64_t records =
+        width / m * static_cast<std::int64_t>(sizeof(TileRecord) + 2 * sizeof(ParentRecord) + 4096);
     return bands + corners + records + width * 12 + (std::int64_t{2} << 20);
 }
 

@@ -1,5 +1,6 @@
 // Builds the height pyramid in one pass over the spool, band by band from north to south: deepest tiles as their rows
-// arrive, coarser tiles as soon as their last row is known. Memory: one band of (m+1) rows a level, about twice the finest.
+// arrive, coarser tiles as soon as their last row is known. Memory: one band of (m+1) rows a level, about twice the
+// finest.
 #pragma once
 
 #include <atomic>

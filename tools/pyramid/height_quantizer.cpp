@@ -33,16 +33,20 @@ Result<HeightQuantizer> choose_quantizer(const QuantizerInput& in) {
     HeightQuantizer q{in.scale, in.offset_m, in.offset_m, 1};
     const double low = q.metres(in.min_raw), high = q.metres(in.max_raw);
     if (!(std::abs(low) <= kGreatestHeight && std::abs(high) <= kGreatestHeight))
-        return Error{ErrorCode::input,
-                     fmt::format("heights reach from {} to {} m, beyond 1e7 m: an undeclared nodata value, or the wrong "
-                                 "--height-scale",
-                                 low, high)};
+        return Error{
+            ErrorCode::input,
+            fmt::format("heights reach from {} to {} m, beyond 1e7 m: an undeclared nodata value, or the wrong "
+                        "--height-scale",
+                        low, high)};
     if (in.quantum_m) {
         q.quantum_m = *in.quantum_m;
-        if (!fits(q, low, high)) q.height_offset_m += std::nearbyint((low + high) / 2 / q.quantum_m - in.offset_m / q.quantum_m) * q.quantum_m;
         if (!fits(q, low, high))
-            return Error{ErrorCode::usage, fmt::format("--height-quantum {} m cannot hold heights from {} to {} m in 23 bits",
-                                                       *in.quantum_m, low, high)};
+            q.height_offset_m +=
+                std::nearbyint((low + high) / 2 / q.quantum_m - in.offset_m / q.quantum_m) * q.quantum_m;
+        if (!fits(q, low, high))
+            return Error{ErrorCode::usage,
+                         fmt::format("--height-quantum {} m cannot hold heights from {} to {} m in 23 bits",
+                                     *in.quantum_m, low, high)};
         return q;
     }
     q.quantum_m = in.integer_source ? in.scale : kDefaultQuantum;

@@ -22,7 +22,8 @@ Error io_error(const std::string& path, const char* what) {
     return {ErrorCode::io, fmt::format("{}: {} the temporary height file: {}", path, what, std::strerror(errno))};
 }
 
-Result<void> write_at(int fd, const std::string& path, const std::uint8_t* data, std::int64_t size, std::int64_t offset) {
+Result<void> write_at(int fd, const std::string& path, const std::uint8_t* data, std::int64_t size,
+                      std::int64_t offset) {
     while (size > 0) {
         const ssize_t n = ::pwrite(fd, data, static_cast<std::size_t>(size), offset);
         if (n < 0 && errno == EINTR) continue;
@@ -65,7 +66,12 @@ bool fill_row(std::vector<double>& row) {
 HeightSpool::Descriptor::~Descriptor() { ::close(fd); }
 
 HeightSpool::HeightSpool(int fd, std::string path, std::int64_t width, std::int64_t height, bool wide)
-    : file_{fd}, path_(std::move(path)), width_(width), height_(height), wide_(wide), row_bytes_(bytes_of_row(width, wide)) {
+    : file_{fd},
+      path_(std::move(path)),
+      width_(width),
+      height_(height),
+      wide_(wide),
+      row_bytes_(bytes_of_row(width, wide)) {
     record_.resize(static_cast<std::size_t>(row_bytes_));
 }
 
@@ -73,8 +79,8 @@ std::int64_t HeightSpool::bytes_needed(std::int64_t width, std::int64_t height, 
     return height * bytes_of_row(width, wide);
 }
 
-Result<std::unique_ptr<HeightSpool>> HeightSpool::create(const std::string& path, std::int64_t width, std::int64_t height,
-                                                         bool wide) {
+Result<std::unique_ptr<HeightSpool>> HeightSpool::create(const std::string& path, std::int64_t width,
+                                                         std::int64_t height, bool wide) {
     std::string name = path + ".XXXXXX";
     const int fd = ::mkostemp(name.data(), O_CLOEXEC);
     if (fd < 0) return io_error(path, "cannot create");
@@ -92,7 +98,8 @@ Result<void> HeightSpool::write_row(std::int64_t j, bool all_void) {
             std::memcpy(record_.data() + i * 4, &v, 4);
         }
     }
-    if (all_void) std::fill(record_.begin() + width_ * static_cast<std::int64_t>(value_bytes), record_.end(), std::uint8_t{0});
+    if (all_void)
+        std::fill(record_.begin() + width_ * static_cast<std::int64_t>(value_bytes), record_.end(), std::uint8_t{0});
     return write_at(file_.fd, path_, record_.data(), row_bytes_, j * row_bytes_);
 }
 
@@ -128,7 +135,8 @@ Result<void> HeightSpool::append(std::span<const double> row) {
 
 Result<HeightSpool::Summary> HeightSpool::finish() {
     assert(rows_ == height_);
-    if (summary_.valid_samples == 0) return Error{ErrorCode::input, "every height is a void: there is nothing to build"};
+    if (summary_.valid_samples == 0)
+        return Error{ErrorCode::input, "every height is a void: there is nothing to build"};
     return summary_;
 }
 
@@ -169,8 +177,7 @@ Result<void> HeightSpool::read_valid(std::int64_t j, std::span<std::uint8_t> val
     auto bytes = row_bytes(j);
     if (!bytes) return bytes.error();
     const std::uint8_t* bits = *bytes + width_ * (wide_ ? 8 : 4);
-    for (std::int64_t i = 0; i < width_; ++i)
-        valid[static_cast<std::size_t>(i)] = (bits[i / 8] >> (i % 8)) & 1;
+    for (std::int64_t i = 0; i < width_; ++i) valid[static_cast<std::size_t>(i)] = (bits[i / 8] >> (i % 8)) & 1;
     return {};
 }
 

@@ -1,10 +1,10 @@
-// HeightSpool: the source heights as one row-major temporary file, voids filled, with a validity bit a sample. The builder
-// reads the source once, then knows range and fill before it quantises, and holds no image in memory.
+// HeightSpool: the source heights as one row-major temporary file, voids filled, with a validity bit a sample. The
+// builder reads the source once, then knows range and fill before it quantises, and holds no image in memory.
 //
-// Fill rule (docs/building-pyramids.md): in a row, a void takes the value interpolated linearly between the nearest valid
-// samples west and east of it, or the nearest one's where there is only one. A row without any valid sample repeats the row
-// above it; such rows at the top repeat the first row that has one. Filled samples are never drawn over present cells; they
-// only give coarse meshes at the data's edge somewhere to stand.
+// Fill rule (docs/building-pyramids.md): in a row, a void takes the value interpolated linearly between the nearest
+// valid samples west and east of it, or the nearest one's where there is only one. A row without any valid sample
+// repeats the row above it; such rows at the top repeat the first row that has one. Filled samples are never drawn over
+// present cells; they only give coarse meshes at the data's edge somewhere to stand.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +25,8 @@ public:
         double min_raw = 0, max_raw = 0;  ///< over valid samples
     };
 
-    /// A file of a new name that begins with `path`, unlinked at once: it vanishes with the process. `wide`: values do not fit float32.
+    /// A file of a new name that begins with `path`, unlinked at once: it vanishes with the process. `wide`: values do
+    /// not fit float32.
     static Result<std::unique_ptr<HeightSpool>> create(const std::string& path, std::int64_t width, std::int64_t height,
                                                        bool wide);
     static std::int64_t bytes_needed(std::int64_t width, std::int64_t height, bool wide);

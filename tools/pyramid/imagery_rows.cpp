@@ -45,7 +45,8 @@ ImageryRows::ImageryRows(ImageSource& source, const Georeference& where, const T
 }
 
 std::int64_t ImageryRows::bytes_needed(const ImageInfo& info, std::int64_t texels_wide) {
-    return (kBandRows + 1) * info.width * 4 + texels_wide * static_cast<std::int64_t>(sizeof(Column)) + 2 * info.unit_bytes;
+    return (kBandRows + 1) * info.width * 4 + texels_wide * static_cast<std::int64_t>(sizeof(Column)) +
+           2 * info.unit_bytes;
 }
 
 Result<const std::uint8_t*> ImageryRows::image_row(std::int64_t row) {
@@ -55,11 +56,13 @@ Result<const std::uint8_t*> ImageryRows::image_row(std::int64_t row) {
         band_.resize(static_cast<std::size_t>((kBandRows + 1) * width_ * 4));
         std::int64_t kept = 0;
         if (band_rows_ > 0 && row == band_first_ + band_rows_) {
-            std::memmove(band_.data(), band_.data() + (band_rows_ - 1) * width_ * 4, static_cast<std::size_t>(width_ * 4));
+            std::memmove(band_.data(), band_.data() + (band_rows_ - 1) * width_ * 4,
+                         static_cast<std::size_t>(width_ * 4));
             kept = 1;
         }
         const auto bytes = static_cast<std::size_t>(count * width_ * 4);
-        if (auto ok = source_.read_rgba8(row, row + count, {band_.data() + kept * width_ * 4, bytes}); !ok) return ok.error();
+        if (auto ok = source_.read_rgba8(row, row + count, {band_.data() + kept * width_ * 4, bytes}); !ok)
+            return ok.error();
         band_first_ = row - kept;
         band_rows_ = count + kept;
     }

@@ -1,5 +1,5 @@
-// Texel rows of the finest texture level from a georeferenced image: bilinear between pixel centres, an exact copy where the
-// texels coincide with the pixels. Reads the image once, forward, holding two rows and the reader's own band.
+// Texel rows of the finest texture level from a georeferenced image: bilinear between pixel centres, an exact copy
+// where the texels coincide with the pixels. Reads the image once, forward, holding two rows and the reader's own band.
 #pragma once
 
 #include <cstdint>
@@ -35,8 +35,8 @@ private:
     std::int64_t width_, height_;
     double row_first_, row_step_;  // image row of texel row r = row_first + r * row_step
     struct Column {
-        std::int32_t left;    // pixel index, -1: outside
-        std::uint16_t weight; // of the right neighbour, 0..256
+        std::int32_t left;     // pixel index, -1: outside
+        std::uint16_t weight;  // of the right neighbour, 0..256
     };
     std::vector<Column> columns_;
     std::int64_t copy_from_ = -1;  // identity columns: first pixel, else -1

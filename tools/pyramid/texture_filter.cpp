@@ -9,8 +9,8 @@
 namespace scree {
 namespace {
 
-// Linear intensity in 0..65535 x 1/4: four texels sum below 2^18 / 4. 14 bits resolve the darkest sRGB step (1/3294) five
-// times over and keep the way back a table of 16 K entries.
+// Linear intensity in 0..65535 x 1/4: four texels sum below 2^18 / 4. 14 bits resolve the darkest sRGB step (1/3294)
+// five times over and keep the way back a table of 16 K entries.
 constexpr int kLinearBits = 14;
 constexpr std::uint32_t kLinearOne = (1u << kLinearBits) - 1;
 
@@ -50,13 +50,15 @@ void downsample_rgba_row(const std::uint8_t* upper, const std::uint8_t* lower, s
         if (alpha == 4 * 255) {
             for (int c = 0; c < 3; ++c)
                 o[c] = t.to_srgb[(std::uint32_t{t.to_linear[a[c]]} + t.to_linear[a[4 + c]] + t.to_linear[b[c]] +
-                                  t.to_linear[b[4 + c]] + 2) >> 2];
+                                  t.to_linear[b[4 + c]] + 2) >>
+                                 2];
         } else if (alpha == 0) {
             o[0] = o[1] = o[2] = 0;
         } else {
             for (int c = 0; c < 3; ++c) {
-                const std::uint32_t sum = std::uint32_t{t.to_linear[a[c]]} * a[3] + std::uint32_t{t.to_linear[a[4 + c]]} * a[7] +
-                                          std::uint32_t{t.to_linear[b[c]]} * b[3] + std::uint32_t{t.to_linear[b[4 + c]]} * b[7];
+                const std::uint32_t sum =
+                    std::uint32_t{t.to_linear[a[c]]} * a[3] + std::uint32_t{t.to_linear[a[4 + c]]} * a[7] +
+                    std::uint32_t{t.to_linear[b[c]]} * b[3] + std::uint32_t{t.to_linear[b[4 + c]]} * b[7];
                 o[c] = t.to_srgb[std::min(kLinearOne, (sum + alpha / 2) / alpha)];
             }
         }

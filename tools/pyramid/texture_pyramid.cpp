@@ -15,7 +15,7 @@
 namespace scree {
 namespace {
 
-constexpr int kRowsPerPush = 16;        // 16 rows of 64 K texels are 4 MB
+constexpr int kRowsPerPush = 16;            // 16 rows of 64 K texels are 4 MB
 constexpr std::int64_t kChunkBlocks = 512;  // blocks of a row encoded by one task: 8 K texels, about 50 us
 
 std::int64_t round_up(std::int64_t v, std::int64_t multiple) { return (v + multiple - 1) / multiple * multiple; }
@@ -28,10 +28,10 @@ std::int64_t texels(std::int64_t cells, const Lattice& lattice, int size_log2, i
 
 // One level of the pyramid, or (below level 0) a mip of the roots.
 struct Level {
-    int id = 0;               // may be negative
-    std::int64_t width = 0;   // texels
+    int id = 0;                  // may be negative
+    std::int64_t width = 0;      // texels
     std::int64_t band_rows = 0;  // texel rows of a band of tiles
-    int capacity = 4;         // rows gathered before they are encoded
+    int capacity = 4;            // rows gathered before they are encoded
     int gathered = 0;
     std::int64_t rows_done = 0;
     std::vector<std::uint8_t> rows;    // capacity * width RGBA
@@ -57,8 +57,8 @@ struct TexturePyramid::Impl {
         tbb::parallel_for(std::int64_t{0}, block_rows * chunks, [&](std::int64_t task) {
             const std::int64_t row = task / chunks, from = task % chunks * kChunkBlocks;
             const std::int64_t count = std::min(kChunkBlocks, block_columns - from);
-            encode_bc1_row(level.rows.data() + (row * 4 * level.width + from * 4) * 4, static_cast<std::size_t>(level.width * 4),
-                           static_cast<std::size_t>(count),
+            encode_bc1_row(level.rows.data() + (row * 4 * level.width + from * 4) * 4,
+                           static_cast<std::size_t>(level.width * 4), static_cast<std::size_t>(count),
                            level.blocks.data() + ((first_row + row) * block_columns + from) * 8);
         });
     }
@@ -115,7 +115,8 @@ struct TexturePyramid::Impl {
         std::array<std::uint8_t, 4> one{};
         const std::uint8_t* pixels = level.rows.data() + (level.gathered - 4) * level.width * 4 + id.x * 16;
         for (int r = 0; r < 2; ++r)
-            downsample_rgba_row(pixels + 2 * r * level.width * 4, pixels + (2 * r + 1) * level.width * 4, 2, two.data() + 8 * r);
+            downsample_rgba_row(pixels + 2 * r * level.width * 4, pixels + (2 * r + 1) * level.width * 4, 2,
+                                two.data() + 8 * r);
         downsample_rgba_row(two.data(), two.data() + 8, 1, one.data());
         std::array<std::uint8_t, 64> repeated{};
         for (std::size_t t = 0; t < 16; ++t)
@@ -138,12 +139,13 @@ struct TexturePyramid::Impl {
         return false;
     }
 
-    // Every level whose band the last rows completed is turned into tiles, finest first: a tile's mips stand in the coarser
-    // levels' blocks, which are reused only after their own band is complete.
+    // Every level whose band the last rows completed is turned into tiles, finest first: a tile's mips stand in the
+    // coarser levels' blocks, which are reused only after their own band is complete.
     Result<void> emit() {
         for (std::size_t index = 0; index < levels.size() && levels[index].id >= 0; ++index) {
             Level& level = levels[index];
-            if (level.rows_done == 0 || level.rows_done % level.band_rows != 0 || level.gathered != level.capacity) break;
+            if (level.rows_done == 0 || level.rows_done % level.band_rows != 0 || level.gathered != level.capacity)
+                break;
             const std::int64_t y = level.rows_done / level.band_rows - 1;
             if (auto ok = emit_band(level, y); !ok) return ok;
         }
@@ -160,7 +162,8 @@ struct TexturePyramid::Impl {
             TextureTile tile = assemble(id);
             if (deep && !any_opaque(tile, job.texture_size_log2)) return;
             tile.child_mask = child_mask(id);
-            payloads[static_cast<std::size_t>(x)] = encode_texture_tile(tile, job.texture_size_log2, TextureCodec::split);
+            payloads[static_cast<std::size_t>(x)] =
+                encode_texture_tile(tile, job.texture_size_log2, TextureCodec::split);
         });
         for (std::int64_t x = 0; x < columns; ++x) {
             const auto& payload = payloads[static_cast<std::size_t>(x)];
@@ -168,8 +171,8 @@ struct TexturePyramid::Impl {
             const TileId id{level.id, x, y};
             if (deep) deep_tiles.insert(id);
             ++tiles_written;
-            if (auto ok = job.writer->put(TileKind::texture, *tile_key(job.lattice, id), static_cast<int>(TextureCodec::split),
-                                          payload);
+            if (auto ok = job.writer->put(TileKind::texture, *tile_key(job.lattice, id),
+                                          static_cast<int>(TextureCodec::split), payload);
                 !ok)
                 return ok;
         }
@@ -181,7 +184,8 @@ TexturePyramid::TexturePyramid(const TexturePyramidJob& job) : impl_(std::make_u
     impl_->job = job;
     impl_->size = std::int64_t{1} << job.texture_size_log2;
     const std::int64_t size = impl_->size;
-    std::int64_t width = round_up(texels(job.lattice.cells_x, job.lattice, job.texture_size_log2, job.deepest_level), size);
+    std::int64_t width =
+        round_up(texels(job.lattice.cells_x, job.lattice, job.texture_size_log2, job.deepest_level), size);
     int capacity = static_cast<int>(std::min<std::int64_t>(kRowsPerPush, size));
     const int coarsest = -(job.texture_size_log2 - 2);
     for (int id = job.deepest_level; id >= coarsest; --id) {
@@ -247,7 +251,7 @@ std::int64_t TexturePyramid::bytes_needed(const Lattice& lattice, int texture_si
     const std::int64_t size = std::int64_t{1} << texture_size_log2;
     const std::int64_t width = round_up(texels(lattice.cells_x, lattice, texture_size_log2, deepest_level), size);
     const std::int64_t rows = 2 * kRowsPerPush * width * 4;
-    const std::int64_t blocks = 2 * size / 2 * width;           // half a byte a texel, all levels
+    const std::int64_t blocks = 2 * size / 2 * width;            // half a byte a texel, all levels
     const std::int64_t payloads = size / 2 * width * 4 / 3 * 2;  // a band of tiles, assembled and packed
     return rows + blocks + payloads + (std::int64_t{4} << 20);
 }

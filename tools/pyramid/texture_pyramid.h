@@ -1,6 +1,6 @@
-// Turns rows of RGBA texels, north to south, into the texture pyramid in one pass. Every 4 x 4 block is encoded once: tiles
-// have no gutter and the filter is a 2 x 2 box, so mip k of a tile is the block-aligned part of its ancestor k levels up,
-// and is taken from there. Memory: BC1 blocks of one band of tiles a level and a few rows of texels.
+// Turns rows of RGBA texels, north to south, into the texture pyramid in one pass. Every 4 x 4 block is encoded once:
+// tiles have no gutter and the filter is a 2 x 2 box, so mip k of a tile is the block-aligned part of its ancestor k
+// levels up, and is taken from there. Memory: BC1 blocks of one band of tiles a level and a few rows of texels.
 #pragma once
 
 #include <cstdint>

@@ -10,11 +10,11 @@
 namespace scree {
 
 struct Georeference {
-    double first_x = 0;  ///< x of the centre of sample (column 0, row 0), CRS units
-    double first_y = 0;  ///< y of the same
-    double step_x = 1;   ///< x from one column to the next
-    double step_y = -1;  ///< y from one row to the next; negative in a north-up file
-    bool rotated = false;          ///< ModelTransformation or world file with rotation terms: steps are meaningless then
+    double first_x = 0;    ///< x of the centre of sample (column 0, row 0), CRS units
+    double first_y = 0;    ///< y of the same
+    double step_x = 1;     ///< x from one column to the next
+    double step_y = -1;    ///< y from one row to the next; negative in a north-up file
+    bool rotated = false;  ///< ModelTransformation or world file with rotation terms: steps are meaningless then
     bool raster_is_point = false;  ///< GTRasterTypeGeoKey was PixelIsPoint
     bool geographic = false;       ///< degrees, not metres
     std::string crs;               ///< "EPSG:n", or empty when the file names none (a world file)

@@ -28,12 +28,13 @@ struct ImageInfo {
     int alpha_channel = -1;  ///< index, or -1
     SampleType type = SampleType::u8;
     bool tiled = false;
-    std::optional<double> nodata;       ///< GDAL_NODATA tag, already cast to the pixel type
-    std::int64_t unit_bytes = 0;        ///< decoded bytes of the largest unit that must be held at once
+    std::optional<double> nodata;  ///< GDAL_NODATA tag, already cast to the pixel type
+    std::int64_t unit_bytes = 0;   ///< decoded bytes of the largest unit that must be held at once
 };
 
 struct OpenOptions {
-    std::int64_t max_unit_bytes = INT64_MAX;  ///< a strip, row of tiles or frame above this is refused, naming the size needed
+    std::int64_t max_unit_bytes =
+        INT64_MAX;  ///< a strip, row of tiles or frame above this is refused, naming the size needed
 };
 
 class ImageSource {
@@ -43,8 +44,8 @@ public:
     virtual ~ImageSource() = default;
 
     virtual const ImageInfo& info() const = 0;
-    /// Absent when the file carries none. A file whose georeference cannot be used (rotated, non-square...) still opens:
-    /// the facts are in Georeference and the caller decides.
+    /// Absent when the file carries none. A file whose georeference cannot be used (rotated, non-square...) still
+    /// opens: the facts are in Georeference and the caller decides.
     virtual const std::optional<Georeference>& georeference() const = 0;
 
     /// Rows [row_begin, row_end), channel 0, row-major into out ((row_end-row_begin)*width values). No nodata handling.

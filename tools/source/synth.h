@@ -43,8 +43,8 @@ struct SynthProgress {
 /// Called a few times a second at most, by one thread at a time (not always the same). May be empty.
 using ProgressSink = std::function<void(const SynthProgress&)>;
 
-/// Errors: usage (an option out of range, or an output that exists without force), io (no space, write failed), interrupted.
-/// The files appear under their final names whole, both or (on a failure) neither.
+/// Errors: usage (an option out of range, or an output that exists without force), io (no space, write failed),
+/// interrupted. The files appear under their final names whole, both or (on a failure) neither.
 Result<SynthReport> synthesize(const SynthOptions& options, ProgressSink progress);
 
 }  // namespace scree

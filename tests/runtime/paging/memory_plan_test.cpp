@@ -60,19 +60,28 @@ TEST(MemoryPlan, NeverPassesTheBudgetAndKeepsRootsToAnEighth) {
     EXPECT_GT(refused, 2000);
 }
 
-TEST(MemoryPlan, LeavesTexturesRoomToSplitARoot) {
-    SCREE_TRACE_SEED();
-    test::Random random(test::seed());
-    for (int k = 0; k < 20000; ++k) {
-        const Dataset d = random_dataset(random);
-        const auto plan =
-            plan_memory(d, static_cast<std::int64_t>(std::exp(std::uniform_real_distribution<double>(8, 26)(random))));
-        if (!plan) continue;
-        const std::int64_t roots = d.lattice.root_rows * d.lattice.root_columns;
-        ASSERT_GE(plan->texture_slots, std::min(roots + 4, d.texture_tiles))
-            << "tile cells 2^" << d.lattice.tile_cells_log2 << ", texture 2^" << d.texture_size_log2 << ", " << roots
-            << " roots";
-    }
+TEST(MemoryPlan, LeavesTexturesRoomToSplitARootAtTheSmallestBudgetOfAnyShape) {
+    for (int n = kMinTileCellsLog2; n <= kMaxTileCellsLog2; ++n)
+        for (int texture = kMinTextureSizeLog2; texture <= kMaxTextureSizeLog2; ++texture)
+            for (const int roots : {1, 2, 5, 64}) {
+                Dataset d;
+                d.lattice.tile_cells_log2 = n;
+                d.texture_size_log2 = texture;
+                d.lattice.root_columns = roots;
+                d.height_tiles = d.texture_tiles = std::int64_t{1} << 40;
+                std::int64_t low = 0, high = std::int64_t{1} << 40;  // refused, accepted
+                while (high - low > 1) {
+                    const std::int64_t middle = (low + high) / 2;
+                    (plan_memory(d, middle).ok() ? high : low) = middle;
+                }
+                for (const std::int64_t budget : {high, high + high / 10, 2 * high}) {
+                    const auto plan = plan_memory(d, budget);
+                    ASSERT_TRUE(plan.ok());
+                    EXPECT_GE(plan->height_slots, roots + 4);
+                    EXPECT_GE(plan->texture_slots, roots + 4) << "tile cells 2^" << n << ", texture 2^" << texture
+                                                              << ", " << roots << " roots, " << budget << " bytes";
+                }
+            }
 }
 
 TEST(MemoryPlan, RefusesWhatIsTooSmallAndNamesWhatSuffices) {
@@ -89,9 +98,13 @@ TEST(MemoryPlan, RefusesWhatIsTooSmallAndNamesWhatSuffices) {
         }
         const auto refused = plan_memory(d, low);
         ASSERT_FALSE(refused.ok());
-        const std::string need = std::to_string(std::lround(static_cast<double>(high) / 1e5) / 10);
-        EXPECT_NE(refused.error().message.find(need), std::string::npos)
-            << refused.error().message << "; suffices: " << high;
+        // The figure it names, typed after --budget, is enough, and no more than rounding asks for.
+        const std::string message = refused.error().message;
+        const std::size_t colon = message.find(": ");
+        ASSERT_NE(colon, std::string::npos) << message;
+        const auto named = static_cast<std::int64_t>(std::stod(message.substr(colon + 2)) * 1024 * 1024 + 0.5);
+        EXPECT_TRUE(plan_memory(d, named).ok()) << message << "; suffices: " << high;
+        EXPECT_LE(named, high + 110000) << message << "; suffices: " << high;
         // And nothing in between is refused again.
         for (int more = 0; more < 20; ++more)
             EXPECT_TRUE(plan_memory(d, high + test::uniform(random, 0, 1 << 30)).ok());

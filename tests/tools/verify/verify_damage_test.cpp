@@ -304,10 +304,12 @@ TEST(VerifyDamage, TheSchema) {
 }
 
 TEST(VerifyDamage, AViewInPlaceOfATableIsNotQueriedAtAll) {
-    const auto report = try_verify_after({}, "DROP TABLE texture; CREATE VIEW texture AS SELECT * FROM height", kTerrain);
+    const auto report =
+        try_verify_after({}, "DROP TABLE texture; CREATE VIEW texture AS SELECT * FROM height", kTerrain);
     ASSERT_FALSE(report.ok());
     EXPECT_EQ(report.error().code, ErrorCode::store);
-    EXPECT_NE(report.error().message.find("tables of a store are missing"), std::string::npos) << report.error().message;
+    EXPECT_NE(report.error().message.find("tables of a store are missing"), std::string::npos)
+        << report.error().message;
 }
 
 TEST(VerifyDamage, ThousandsOfProblemsAreCountedNotListed) {
