@@ -13,7 +13,7 @@ packages=(
     # scree-view: the window, headless OpenGL with Mesa's software driver, pictures out
     libegl-dev libegl-mesa0 libepoxy-dev libgl1-mesa-dri libglfw3-dev libglm-dev libimgui-dev libpng-dev
     # tests; a virtual display for those of the window
-    libgtest-dev libstb-dev xauth xdotool xvfb
+    imagemagick libgtest-dev libstb-dev xauth xdotool xvfb
     # benches, and the encoders they measure against
     libbenchmark-dev libsquish-dev
 )
