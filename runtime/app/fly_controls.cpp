@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 namespace scree {
 namespace {
@@ -17,17 +18,28 @@ FlyControls::FlyControls(GLFWwindow* window, const FlightPose& home, double exte
     : window_(window), home_(home), speed_(extent_m / 20), least_speed_(extent_m / 1e5), greatest_speed_(extent_m) {
     glfwSetWindowUserPointer(window_, this);
     glfwSetScrollCallback(window_, on_scroll);
+    glfwSetKeyCallback(window_, on_key);
     go_home();
 }
 
 FlyControls::~FlyControls() {
     glfwSetScrollCallback(window_, nullptr);
+    glfwSetKeyCallback(window_, nullptr);
     glfwSetWindowUserPointer(window_, nullptr);
 }
 
 void FlyControls::on_scroll(GLFWwindow* window, double, double dy) {
     auto* self = static_cast<FlyControls*>(glfwGetWindowUserPointer(window));
     self->speed_ = std::clamp(self->speed_ * std::pow(1.25, dy), self->least_speed_, self->greatest_speed_);
+}
+
+void FlyControls::on_key(GLFWwindow* window, int key, int, int action, int) {
+    if (action == GLFW_PRESS) ++static_cast<FlyControls*>(glfwGetWindowUserPointer(window))->presses_[key];
+}
+
+int FlyControls::take_presses(int key) {
+    const auto it = presses_.find(key);
+    return it == presses_.end() ? 0 : std::exchange(it->second, 0);
 }
 
 void FlyControls::go_home() {
@@ -41,7 +53,7 @@ void FlyControls::go_home() {
 void FlyControls::move(double seconds, double ground_m) {
     moved_ = false;
     const auto down = [&](int key) { return glfwGetKey(window_, key) == GLFW_PRESS; };
-    if (down(GLFW_KEY_HOME)) go_home();
+    if (take_presses(GLFW_KEY_HOME) > 0) go_home();
     double x = 0, y = 0;
     glfwGetCursorPos(window_, &x, &y);
     const bool pressed = glfwGetMouseButton(window_, GLFW_MOUSE_BUTTON_LEFT) == GLFW_PRESS;

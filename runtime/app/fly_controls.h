@@ -1,6 +1,8 @@
 // FlyControls: a free camera moved by keys, mouse and wheel of a GLFW window.
 #pragma once
 
+#include <map>
+
 #include <glm/glm.hpp>
 
 #include "runtime/view/camera.h"
@@ -20,12 +22,15 @@ public:
 
     /// Moves by what is held down for `seconds`; `ground_m` is the height under the eye, kept below it by a little.
     void move(double seconds, double ground_m);
+    /// How often a key went down since the last call. Counted from events: a tap shorter than a frame is not lost.
+    int take_presses(int key);
     FlightPose pose() const;
     double speed_m_per_s() const { return speed_; }
     bool moved() const { return moved_; }
 
 private:
     static void on_scroll(GLFWwindow* window, double dx, double dy);
+    static void on_key(GLFWwindow* window, int key, int scancode, int action, int modifiers);
     void go_home();
 
     GLFWwindow* window_;
@@ -36,6 +41,7 @@ private:
     double speed_ = 100;
     double least_speed_, greatest_speed_;
     double mouse_x_ = 0, mouse_y_ = 0;
+    std::map<int, int> presses_;  ///< by key
     bool dragging_ = false;
     bool moved_ = true;
 };

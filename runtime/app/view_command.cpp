@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 
 #include "common/report.h"
@@ -16,27 +17,6 @@ namespace scree {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-// A key that acts once when it goes down.
-class KeyPress {
-public:
-    explicit KeyPress(int key) : key_(key) {}
-    bool pressed(GLFWwindow* window) {
-        const bool down = glfwGetKey(window, key_) == GLFW_PRESS;
-        const bool fresh = down && !was_down_;
-        was_down_ = down;
-        return fresh;
-    }
-
-private:
-    int key_;
-    bool was_down_ = false;
-};
-
-struct Keys {
-    KeyPress wireframe{GLFW_KEY_F}, levels{GLFW_KEY_L}, finer{GLFW_KEY_RIGHT_BRACKET}, coarser{GLFW_KEY_LEFT_BRACKET},
-        hud{GLFW_KEY_H};
-};
 
 HudLines status_lines(const Scene& scene, const SceneFrame& frame, const FlightPose& pose, double fps, double speed) {
     const Selection& s = *frame.selection;
@@ -71,7 +51,6 @@ Result<void> view(ViewOptions o, double seconds) {
     const double extent = static_cast<double>(std::max(d.lattice.cells_x, d.lattice.cells_y)) * d.lattice.spacing_m;
     FlyControls controls(window, overview(d, o.fov_deg, static_cast<double>(o.width_px) / o.height_px), extent);
     Hud hud(window);
-    Keys keys;
     bool show_hud = true, redraw = true;
     double mean_frame_s = 0;  // over frames that were drawn
     const auto start = Clock::now();
@@ -81,7 +60,7 @@ Result<void> view(ViewOptions o, double seconds) {
         const double elapsed = std::chrono::duration<double>(now - last).count();
         last = now;
         if (seconds > 0 && std::chrono::duration<double>(now - start).count() > seconds) break;
-        if (glfwGetKey(window, GLFW_KEY_ESCAPE) == GLFW_PRESS) break;
+        if (controls.take_presses(GLFW_KEY_ESCAPE) > 0) break;
 
         int width = 0, height = 0;
         glfwGetFramebufferSize(window, &width, &height);
@@ -95,11 +74,17 @@ Result<void> view(ViewOptions o, double seconds) {
         auto under = (*ground)->height(before.eye.x, before.eye.y);
         controls.move(std::min(elapsed, 0.1), under && *under ? **under : -1e9);
         FrameSettings& settings = (*display)->frame_settings();
-        if (keys.wireframe.pressed(window)) settings.wireframe = !settings.wireframe, redraw = true;
-        if (keys.levels.pressed(window)) settings.colour_by_level = !settings.colour_by_level, redraw = true;
-        if (keys.finer.pressed(window)) (*scene)->options().tau_px *= 0.8, redraw = true;
-        if (keys.coarser.pressed(window)) (*scene)->options().tau_px *= 1.25, redraw = true;
-        if (keys.hud.pressed(window)) show_hud = !show_hud, redraw = true;
+        const auto toggle = [&](int key, bool& value) {
+            const int presses = controls.take_presses(key);
+            value = value != (presses % 2 == 1);
+            redraw = redraw || presses > 0;
+        };
+        toggle(GLFW_KEY_F, settings.wireframe);
+        toggle(GLFW_KEY_L, settings.colour_by_level);
+        toggle(GLFW_KEY_H, show_hud);
+        const int steps = controls.take_presses(GLFW_KEY_LEFT_BRACKET) - controls.take_presses(GLFW_KEY_RIGHT_BRACKET);
+        (*scene)->options().tau_px *= std::pow(1.25, steps);
+        redraw = redraw || steps != 0;
 
         const FlightPose pose = controls.pose();
         auto camera = camera_of(pose, o);
