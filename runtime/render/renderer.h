@@ -47,6 +47,8 @@ struct FrameSettings {
     double haze_scale_height_m = 2500;
     /// Height (z) of the plane that stands in for the world beyond the data.
     double ground_height_m = 0;
+    /// 1 / (2 R) of the earth's curvature, 1/m; 0: flat.
+    double half_curvature = 0;
     /// For finding faults.
     bool wireframe = false;
     bool colour_by_level = false;

@@ -2,7 +2,7 @@
 // edge and in GLSL (runtime/render/shaders/terrain_position.glsl holds the same three lines):
 //     x = float(i - i0) * spacing - frac_x      one integer subtraction, one multiplication, one subtraction
 // (i0, j0, n0) is the lattice point nearest the eye, clamped to the dataset; frac is what is left of the eye, in
-// metres.
+// metres. Earth curvature lowers a point by the square of its horizontal distance over twice the radius.
 #pragma once
 
 #include <cstdint>
@@ -18,11 +18,15 @@ struct RelativeFrame {
     float spacing_m = 1, quantum_m = 1;
     glm::vec3 fraction_m{0, 0, 0};  ///< eye minus the lattice point's position (x east, y north, z up)
 
-    /// The position of lattice vertex (i, j) at n quanta relative to the eye, as the vertex shader computes it.
-    glm::vec3 position(std::int32_t i, std::int32_t j, float height_n) const;
+    float half_curvature = 0;  ///< 1 / (2 R); 0: the world is flat
+
+    /// The position of lattice vertex (i, j) at n quanta relative to the eye, as the vertex shader computes it:
+    /// z is lowered by (x^2 + y^2 + morph_reach_m2) * half_curvature. morph_reach_m2: VertexMorph's weight times its
+    /// squared reach in metres, so that a vertex that has moved wholly lies on the middle of its neighbours' line.
+    glm::vec3 position(std::int32_t i, std::int32_t j, float height_n, float morph_reach_m2 = 0) const;
 };
 
 RelativeFrame make_relative_frame(const Lattice& lattice, double height_offset_m, double height_quantum_m,
-                                  glm::dvec3 eye);
+                                  glm::dvec3 eye, double half_curvature = 0);
 
 }  // namespace scree
