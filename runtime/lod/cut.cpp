@@ -1,6 +1,7 @@
 #include "runtime/lod/cut.h"
 
 #include <algorithm>
+#include <bit>
 #include <cassert>
 #include <cmath>
 #include <limits>
@@ -9,6 +10,37 @@ namespace scree {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Errors of successive levels are taken to differ by this factor at least: a level that is left as soon as it is
+/// reached would pop (Scree lod, C15).
+constexpr double kLevelGrowth = 1.25;
+/// Before a page is split for its texture it must have become dense enough for its children: over this many levels a
+/// doubling of the need.
+constexpr double kTextureApproach = 4;
+
+int opposite(int direction) { return (direction + 2) % 4; }
+
+TileId across(TileId id, int direction) {
+    static constexpr std::array<std::array<int, 2>, 4> kStep{{{0, -1}, {1, 0}, {0, 1}, {-1, 0}}};
+    id.x += kStep[static_cast<std::size_t>(direction)][0];
+    id.y += kStep[static_cast<std::size_t>(direction)][1];
+    return id;
+}
+
+/// Quadrant of `ancestor`, on the level below it, in which `id` lies.
+std::size_t quadrant_towards(TileId id, int ancestor_level) {
+    const int shift = id.level - ancestor_level - 1;
+    return static_cast<std::size_t>((((id.y >> shift) & 1) << 1) | ((id.x >> shift) & 1));
+}
+
+/// The other child of the same parent across `direction`, or -1 where that leaves the parent.
+int sibling(int quadrant, int direction) {
+    static constexpr std::array<std::array<int, 4>, 4> kSibling{
+        {{-1, 1, 2, -1}, {-1, -1, 3, 0}, {0, 3, -1, -1}, {1, -1, -1, 2}}};
+    return kSibling[static_cast<std::size_t>(quadrant)][static_cast<std::size_t>(direction)];
+}
+
+Level level_of_share(double share) { return static_cast<Level>(share * kOneLevel); }
 
 }  // namespace
 
@@ -19,261 +51,426 @@ Box Cut::box_of(const CutNode& node) const {
     const LatticePoint corner = lattice_.corner(node.id);
     const auto east = static_cast<double>(std::min(corner.i + extent, lattice_.cells_x));
     const auto south = static_cast<double>(std::min(corner.j + extent, lattice_.cells_y));
-    return {{lattice_.x_m(static_cast<double>(corner.i)), lattice_.y_m(south), dataset_.height_m(node.bounds.min_n)},
-            {lattice_.x_m(east), lattice_.y_m(static_cast<double>(corner.j)), dataset_.height_m(node.bounds.max_n)}};
+    return {{lattice_.x_m(static_cast<double>(corner.i)), lattice_.y_m(south), dataset_.height_m(node.bounds->min_n)},
+            {lattice_.x_m(east), lattice_.y_m(static_cast<double>(corner.j)), dataset_.height_m(node.bounds->max_n)}};
 }
 
-void Cut::measure(CutNode& node) const {
-    const Box box = box_of(node);
-    node.visible = false;
+Box lowered_by_curvature(Box box, glm::dvec3 eye, double half_curvature) {
+    if (!(half_curvature > 0)) return box;
+    const glm::dvec2 low = glm::dvec2(box.low) - glm::dvec2(eye), high = glm::dvec2(box.high) - glm::dvec2(eye);
+    const glm::dvec2 nearest = glm::clamp(glm::dvec2(0), low, high);
+    const glm::dvec2 furthest = glm::max(glm::abs(low), glm::abs(high));
+    box.low.z -= glm::dot(furthest, furthest) * half_curvature;
+    box.high.z -= glm::dot(nearest, nearest) * half_curvature;
+    return box;
+}
+
+// What the views that may see the parent see of the node, and how fine it has to be.
+void Cut::measure(CutNode& node, std::uint32_t candidates, std::uint32_t inside) const {
+    node.seen_by = node.inside = 0;
     node.metres_per_px = node.texel_per_px = kInfinity;
-    for (const LodView& view : views_) {
-        if (!view.frustum.may_see(box)) continue;
-        node.visible = true;
+    if (candidates == 0) return;
+    const Box flat = box_of(node);
+    for (std::size_t v = 0; v < views_.size(); ++v) {
+        const std::uint32_t bit = 1u << v;
+        if ((candidates & bit) == 0) continue;
+        const LodView& view = views_[v];
+        const Box box = lowered_by_curvature(flat, view.eye, settings_.half_curvature);
+        const Sight sight = (inside & bit) != 0 ? Sight::all : view.frustum.sight(box);
+        if (sight == Sight::none) continue;
+        node.seen_by |= bit;
+        if (sight == Sight::all) node.inside |= bit;
         const double distance = std::max(distance_to_box(view.eye, box), view.near_m);
         node.metres_per_px = std::min(node.metres_per_px, distance / view.error_px);
         node.texel_per_px = std::min(node.texel_per_px, distance / view.focal_px);
     }
 }
 
-// The existing node at `id`, or the unsplit ancestor that stands there; -1 where there is nothing.
-std::int32_t Cut::find(TileId id) const {
-    if (!lattice_.contains(id)) return -1;
-    std::int32_t index =
-        roots_[static_cast<std::size_t>((id.y >> id.level) * lattice_.root_columns + (id.x >> id.level))];
-    for (int level = 1; level <= id.level && index >= 0; ++level) {
-        const CutNode& node = nodes_[static_cast<std::size_t>(index)];
-        if (!node.split) return index;
-        const int shift = id.level - level;
-        index = node.children[static_cast<std::size_t>((((id.y >> shift) & 1) << 1) | ((id.x >> shift) & 1))];
-    }
-    return index;
+double Cut::error_m(const CutNode& node, int geomip) const {
+    const double certified =
+        static_cast<double>(node.bounds->error_n[static_cast<std::size_t>(geomip)]) * dataset_.height_quantum_m;
+    if (!(settings_.half_curvature > 0)) return certified;
+    // Between the ends of a triangle's longest side, 2 s where an edge is thinned, a plane stands off the paraboloid by
+    // (2 s)^2 / 8 R.
+    const double stride_m = std::ldexp(lattice_.spacing_m, minimum_exponent(node) + geomip);
+    return certified + stride_m * stride_m * settings_.half_curvature;
 }
 
-std::int32_t Cut::add_node(TileId id, const HeightBounds& bounds, std::int32_t parent, const Residency& residency) {
-    CutNode node;
-    node.id = id;
-    node.bounds = bounds;
-    node.parent = parent;
-    measure(node);
-    if (node.visible || parent < 0) {
-        const ResidentHeight resident = residency.height(id);
-        node.header = resident.header;
-        node.slot = resident.slot;
-        ++pages_;
+// The coarsest level within the tolerance. Between two levels the error is taken as linear in the weight: the surfaces
+// are nested, so it is no larger (Scree lod, C15).
+void Cut::judge(CutNode& node, double parent_error_m) const {
+    const int finest = minimum_exponent(node);
+    node.level = level_of(maximum_exponent(node));
+    node.floor = level_of(finest);
+    if (!node.visible()) return;
+    const double allowed_m = settings_.tau_px * node.metres_per_px;
+    double finer_m = error_m(node, 0);
+    node.finest_error_m = finer_m;
+    if (finer_m > allowed_m) {
+        node.level = level_of(finest);
+        node.wants_geometry = node.id.level < lattice_.deepest_level;
+    } else {
+        for (int geomip = 1; geomip < lattice_.tile_cells_log2; ++geomip) {
+            const double exact_m = error_m(node, geomip);
+            double coarser_m = std::max(exact_m, kLevelGrowth * finer_m);
+            // Never above the parent's at the same stride, so that a child is never held finer than its parent was.
+            if (geomip == 1) coarser_m = std::min(coarser_m, std::max(exact_m, parent_error_m));
+            if (coarser_m > allowed_m) {
+                const double share = (allowed_m - finer_m) / (coarser_m - finer_m);
+                node.level = level_of(finest + geomip - 1) + std::min(level_of_share(share), kOneLevel - 1);
+                break;
+            }
+            finer_m = coarser_m;
+        }
     }
-    nodes_.push_back(node);
+    judge_texture(node);
+}
+
+void Cut::judge_texture(CutNode& node) const {
+    if (node.id.level >= dataset_.texture_deepest_level) return;
+    node.texture_need = dataset_.texel_m(node.id.level) / node.texel_per_px / settings_.texture_tau_px;
+    const double doublings = std::min(std::log2(node.texture_need), 64.0);
+    double limit = 0;
+    if (node.id.level < lattice_.deepest_level) {
+        limit = maximum_exponent(node) - 1 + kTextureApproach * std::max(0.0, -doublings);
+    } else {
+        // Textures deeper than the heights are drawn on parts of the page, each of one block of cells at least.
+        const int deepest = std::min(dataset_.texture_deepest_level - node.id.level, lattice_.tile_cells_log2 - 1);
+        limit = maximum_exponent(node) - std::clamp(doublings, 0.0, static_cast<double>(deepest));
+    }
+    if (limit < maximum_exponent(node)) node.level = std::min(node.level, level_of_share(limit));
+    node.level = std::max(node.level, level_of(minimum_exponent(node)));
+}
+
+std::int32_t Cut::add_node(TileId id, const HeightBounds& bounds, std::int32_t slot, std::int32_t texture_slot,
+                           std::int32_t parent) {
+    CutNode& node = nodes_.emplace_back();
+    node.id = id;
+    node.bounds = &bounds;
+    node.slot = slot;
+    node.texture_slot = texture_slot;
+    node.parent = parent;
+    const CutNode* above = parent < 0 ? nullptr : &nodes_[static_cast<std::size_t>(parent)];
+    const auto every_view = static_cast<std::uint32_t>((std::uint64_t{1} << views_.size()) - 1);
+    measure(node, above == nullptr ? every_view : above->seen_by, above == nullptr ? 0 : above->inside);
+    judge(node, above == nullptr ? kInfinity : above->finest_error_m);
+    if (above != nullptr) node.level = std::min(node.level, above->level);
+    if (node.visible() || parent < 0) ++pages_;
     return static_cast<std::int32_t>(nodes_.size()) - 1;
 }
 
-double Cut::error_need(const CutNode& node, double error_m) const {
-    if (!(error_m > 0)) return 0;
-    const double px = error_m / node.metres_per_px;
-    return settings_.tau_px > 0 ? px / settings_.tau_px : kInfinity;
-}
-
-double Cut::drawn_error_m(std::int32_t leaf) const {
-    const CutNode& node = nodes_[static_cast<std::size_t>(leaf)];
-    if (node.exponent == 0 && edge_mask(leaf) == 0) return 0;
-    const int geomip = node.exponent - minimum_exponent(node);
-    return static_cast<double>(node.bounds.error_n[static_cast<std::size_t>(geomip)]) * dataset_.height_quantum_m;
-}
-
-double Cut::geometry_need(std::int32_t index) const {
-    const CutNode& node = nodes_[static_cast<std::size_t>(index)];
-    const int geomip = node.exponent - minimum_exponent(node);
-    // With thinned edges allowed for: a neighbour may be coarser when all is done.
-    return error_need(
-        node, static_cast<double>(node.bounds.error_n[static_cast<std::size_t>(geomip)]) * dataset_.height_quantum_m);
-}
-
-double Cut::texture_need(const CutNode& node) const {
-    if (node.id.level >= dataset_.texture_deepest_level) return 0;
-    const double need = dataset_.texel_m(node.id.level) / node.texel_per_px / settings_.texture_tau_px;
-    if (node.id.level < lattice_.deepest_level || !(need > 1)) return need;
-    // Textures deeper than the heights are drawn on parts of the page, each of one block of cells at least.
-    int part_level = 0;
-    const int finest = std::min(dataset_.texture_deepest_level - node.id.level, lattice_.tile_cells_log2 - 1);
-    while (part_level < finest && std::ldexp(need, -part_level) > 1) ++part_level;
-    return node.exponent > lattice_.tile_cells_log2 - 1 - part_level ? need : 0;
-}
-
-void Cut::push(std::int32_t index) {
-    const CutNode& node = nodes_[static_cast<std::size_t>(index)];
-    if (!node.visible || node.split || node.blocked) return;
-    const double need = std::max(geometry_need(index), texture_need(node));
-    if (!(need > 1)) return;
-    heap_.push_back({need, index, node.exponent});
-    std::push_heap(heap_.begin(), heap_.end(), [](const HeapEntry& a, const HeapEntry& b) {
-        return a.need != b.need ? a.need < b.need : a.node > b.node;
-    });
-}
-
-void Cut::refine(std::span<const LodView> views, const CutSettings& settings, const Residency& residency) {
-    views_ = views;
-    settings_ = settings;
-    residency_ = &residency;
-    nodes_.clear();
-    heap_.clear();
-    roots_.assign(static_cast<std::size_t>(lattice_.root_rows * lattice_.root_columns), -1);
-    pages_ = steps_ = 0;
-    page_limited_ = false;
-    for (std::int64_t y = 0; y < lattice_.root_rows; ++y)
-        for (std::int64_t x = 0; x < lattice_.root_columns; ++x) {
-            const TileId id{0, x, y};
-            const ResidentHeight resident = residency.height(id);
-            if (resident.header == nullptr) continue;  // a root without any present cell is not stored
-            const std::int32_t index = add_node(id, resident.header->own, -1, residency);
-            nodes_.back().exponent = maximum_exponent(nodes_.back());
-            roots_[static_cast<std::size_t>(y * lattice_.root_columns + x)] = index;
+void Cut::add_roots() {
+    const std::vector<std::int32_t>& slots = residency_->heights.roots;
+    roots_.assign(slots.size(), -1);
+    for (std::size_t k = 0; k < slots.size(); ++k) {
+        if (slots[k] < 0) continue;  // a root without any present cell is not stored
+        const TileId id{0, static_cast<std::int64_t>(k) % lattice_.root_columns,
+                        static_cast<std::int64_t>(k) / lattice_.root_columns};
+        const HeightTileHeader& header = residency_->heights.headers[static_cast<std::size_t>(slots[k])];
+        const std::int32_t texture = residency_->textures.roots.empty() ? kNotResident : residency_->textures.roots[k];
+        roots_[k] = add_node(id, header.own, slots[k], texture, -1);
+    }
+    for (const std::int32_t root : roots_) {
+        if (root < 0) continue;
+        CutNode& node = nodes_[static_cast<std::size_t>(root)];
+        for (int d = 0; d < 4; ++d) {
+            const TileId other = across(node.id, d);
+            if (lattice_.contains(other))
+                node.neighbours[static_cast<std::size_t>(d)] =
+                    roots_[static_cast<std::size_t>(other.y * lattice_.root_columns + other.x)];
         }
-    const auto root_count = static_cast<std::int32_t>(nodes_.size());
-    for (std::int32_t index = 0; index < root_count; ++index) push(index);
-    while (!heap_.empty()) {
-        std::pop_heap(heap_.begin(), heap_.end(), [](const HeapEntry& a, const HeapEntry& b) {
-            return a.need != b.need ? a.need < b.need : a.node > b.node;
-        });
-        const HeapEntry entry = heap_.back();
-        heap_.pop_back();
-        CutNode& node = nodes_[static_cast<std::size_t>(entry.node)];
-        if (node.split || node.blocked || node.exponent != entry.exponent) continue;
-        ++steps_;
-        if (!step(entry.node)) nodes_[static_cast<std::size_t>(entry.node)].blocked = true;
     }
 }
 
-bool Cut::step(std::int32_t index) {
-    const CutNode& node = nodes_[static_cast<std::size_t>(index)];
-    const double geometry = geometry_need(index), texture = texture_need(node);
-    if (geometry > 1) {
-        if (node.exponent > minimum_exponent(node)) return try_reduce(index);
-        if (node.id.level < lattice_.deepest_level) return try_split(index, std::max(geometry, texture));
-        return refine_thinned_neighbours(index) && texture <= 1;
+// The node across one side, as large as this one or larger. Links are brought up to date as they are used: a child
+// starts with its parent's.
+std::int32_t Cut::neighbour(std::int32_t index, int direction) {
+    CutNode& node = nodes_[static_cast<std::size_t>(index)];
+    std::int32_t& link = node.neighbours[static_cast<std::size_t>(direction)];
+    while (link >= 0) {
+        const CutNode& other = nodes_[static_cast<std::size_t>(link)];
+        if (!other.split || other.id.level >= node.id.level) break;
+        link = other.children[quadrant_towards(across(node.id, direction), other.id.level)];
     }
-    if (node.id.level == lattice_.deepest_level || !may_split_now(index)) return try_reduce(index);
-    return try_split(index, texture);
+    return link;
 }
 
-// A split hands the stride over to the children, which are finer pages: it must not pass what they can draw, nor the
-// stride of a neighbour that is then the coarser page.
-bool Cut::may_split_now(std::int32_t index) const {
+template <class Visit>
+void Cut::for_each_leaf_on(std::int32_t index, int side, const Visit& visit) const {
     const CutNode& node = nodes_[static_cast<std::size_t>(index)];
-    if (node.exponent == minimum_exponent(node)) return true;
-    if (node.exponent > maximum_exponent(node) - 1) return false;
-    bool allowed = true;
-    for (const Direction direction : kDirections)
-        for_each_neighbour(index, direction, [&](std::int32_t other) {
-            const CutNode& neighbour = nodes_[static_cast<std::size_t>(other)];
-            if (neighbour.id.level <= node.id.level && neighbour.exponent < node.exponent) allowed = false;
-        });
-    return allowed;
-}
-
-// Halves the stride of a leaf after its neighbours have been brought within the balance of the result.
-bool Cut::try_reduce(std::int32_t index) {
-    const int exponent = nodes_[static_cast<std::size_t>(index)].exponent;
-    const int level = nodes_[static_cast<std::size_t>(index)].id.level;
-    if (exponent <= minimum_exponent(nodes_[static_cast<std::size_t>(index)])) return false;
-    for (const Direction direction : kDirections) {
-        for (;;) {
-            std::int32_t offender = -1;
-            int allowed = 0;
-            for_each_neighbour(index, direction, [&](std::int32_t other) {
-                const CutNode& neighbour = nodes_[static_cast<std::size_t>(other)];
-                const int limit = neighbour.id.level > level ? exponent - 1 : exponent;
-                if (offender < 0 && neighbour.exponent > limit) {
-                    offender = other;
-                    allowed = limit;
-                }
-            });
-            if (offender < 0) break;
-            if (!lower_towards(offender, allowed)) return false;
-        }
-        // Lowering a neighbour may in turn have split or lowered this node: then there is nothing left to do here.
-        const CutNode& self = nodes_[static_cast<std::size_t>(index)];
-        if (self.split || self.exponent != exponent) return true;
+    if (!node.split) {
+        if (node.visible()) visit(index);
+        return;
     }
-    CutNode& self = nodes_[static_cast<std::size_t>(index)];
-    self.exponent = exponent - 1;
-    self.blocked = false;
-    push(index);
-    return true;
+    // The two children that touch `side` of the node.
+    static constexpr std::array<std::array<int, 2>, 4> kTouching{{{0, 1}, {1, 3}, {2, 3}, {0, 2}}};
+    for (const int q : kTouching[static_cast<std::size_t>(side)])
+        if (const std::int32_t child = node.children[static_cast<std::size_t>(q)]; child >= 0)
+            for_each_leaf_on(child, side, visit);
 }
 
-// One step of a neighbour towards `exponent`: denser if its page can be, else a finer page.
-bool Cut::lower_towards(std::int32_t index, int exponent) {
-    const CutNode& node = nodes_[static_cast<std::size_t>(index)];
-    assert(node.exponent > exponent);
-    (void)exponent;
-    if (node.exponent > minimum_exponent(node)) return try_reduce(index);
-    return try_split(index, std::max({1.0, geometry_need(index), texture_need(node)}));
+template <class Visit>
+void Cut::for_each_neighbour(std::int32_t leaf, int direction, const Visit& visit) {
+    if (const std::int32_t other = neighbour(leaf, direction); other >= 0)
+        for_each_leaf_on(other, opposite(direction), visit);
 }
 
-bool Cut::try_split(std::int32_t index, double priority) {
-    const CutNode before = nodes_[static_cast<std::size_t>(index)];
-    if (before.header == nullptr || before.header->child_mask == 0) return false;
-    assert(before.exponent <= maximum_exponent(before) - 1);
-    const auto first = static_cast<std::int32_t>(nodes_.size());
+bool Cut::try_split(std::int32_t index) {
+    {
+        const CutNode& node = nodes_[static_cast<std::size_t>(index)];
+        if (node.slot < 0) return false;
+        // Next to a page that can only be drawn too coarsely for the children there is nothing to be gained.
+        const int coarsest_beside = node.id.level + 1 - lattice_.tile_cells_log2;
+        for (int d = 0; d < 4 && coarsest_beside > 0; ++d)
+            for (;;) {
+                const std::int32_t other = neighbour(index, d);
+                if (other < 0) break;
+                const CutNode& beside = nodes_[static_cast<std::size_t>(other)];
+                if (!beside.visible() || beside.split || beside.id.level >= coarsest_beside) break;
+                if (!try_split(other)) return false;
+            }
+    }
+    const CutNode parent = nodes_[static_cast<std::size_t>(index)];
+    const HeightTileHeader& header = residency_->heights.headers[static_cast<std::size_t>(parent.slot)];
+    if (header.child_mask == 0) return false;
+    const auto& slots = residency_->heights.children[static_cast<std::size_t>(parent.slot)];
+    const std::size_t first = nodes_.size();
     const std::int64_t pages_before = pages_;
     std::array<std::int32_t, 4> children{-1, -1, -1, -1};
-    bool possible = true;
-    for (int q = 0; q < 4 && possible; ++q) {
-        if ((before.header->child_mask >> q & 1) == 0) continue;
-        const TileId id = child_of(before.id, q);
-        const std::int32_t child =
-            add_node(id, before.header->children[static_cast<std::size_t>(q)], index, *residency_);
-        CutNode& node = nodes_[static_cast<std::size_t>(child)];
-        node.exponent = before.exponent;
-        node.priority = priority;
-        children[static_cast<std::size_t>(q)] = child;
-        if (!node.visible || node.header != nullptr) continue;
-        if (settings_.only_resident || residency_->unavailable_height(id)) possible = false;
+    for (int q = 0; q < 4; ++q) {
+        const auto k = static_cast<std::size_t>(q);
+        if ((header.child_mask >> q & 1) == 0) continue;
+        const std::int32_t texture =
+            parent.texture_slot < 0 ? kNotResident
+                                    : residency_->textures.children[static_cast<std::size_t>(parent.texture_slot)][k];
+        children[k] = add_node(child_of(parent.id, q), header.children[k], slots[k], texture, index);
+        const CutNode& child = nodes_[static_cast<std::size_t>(children[k])];
+        if (!child.visible() || child.slot >= 0) continue;
+        if (settings_.only_resident || child.slot == kUnavailable) {
+            nodes_.resize(first);
+            pages_ = pages_before;
+            return false;
+        }
     }
-    if (possible && pages_ > settings_.max_pages) {
-        possible = false;
-        page_limited_ = true;
-    }
-    if (!possible) {
-        nodes_.resize(static_cast<std::size_t>(first));
-        pages_ = pages_before;
-        return false;
+    const double priority =
+        std::max({1.0, parent.texture_need, parent.finest_error_m / (settings_.tau_px * parent.metres_per_px)});
+    for (int q = 0; q < 4; ++q) {
+        const std::int32_t index_of_child = children[static_cast<std::size_t>(q)];
+        if (index_of_child < 0) continue;
+        CutNode& child = nodes_[static_cast<std::size_t>(index_of_child)];
+        child.priority = std::isnan(priority) ? kInfinity : priority;
+        for (int d = 0; d < 4; ++d) {
+            const int beside = sibling(q, d);
+            child.neighbours[static_cast<std::size_t>(d)] = beside < 0 ? parent.neighbours[static_cast<std::size_t>(d)]
+                                                                       : children[static_cast<std::size_t>(beside)];
+        }
     }
     CutNode& self = nodes_[static_cast<std::size_t>(index)];
     self.split = true;
     self.children = children;
-    for (const std::int32_t child : children)
-        if (child >= 0) push(child);
+    ++steps_;
+    if (settings_.growth_s > 0) grow(index);
     return true;
 }
 
-// The finest surface is only inexact where an edge is thinned for a coarser neighbour: that neighbour has to follow.
-bool Cut::refine_thinned_neighbours(std::int32_t index) {
-    if (nodes_[static_cast<std::size_t>(index)].exponent != 0) return false;
-    bool all = true;
-    for (const Direction direction : kDirections)
-        for (;;) {
-            std::int32_t offender = -1;
-            for_each_neighbour(index, direction, [&](std::int32_t other) {
-                if (nodes_[static_cast<std::size_t>(other)].exponent > 0) offender = other;
-            });
-            if (offender < 0) break;
-            if (!lower_towards(offender, 0)) {
-                all = false;
-                break;
-            }
-        }
-    return all;
+// A page that came late starts from its parent's finest shape: the youngest of the visible children sets the pace.
+void Cut::grow(std::int32_t index) {
+    const CutNode& parent = nodes_[static_cast<std::size_t>(index)];
+    double youngest_s = -kInfinity;
+    for (const std::int32_t child : parent.children) {
+        if (child < 0) continue;
+        const CutNode& node = nodes_[static_cast<std::size_t>(child)];
+        if (node.visible() && node.slot >= 0)
+            youngest_s = std::max(youngest_s, residency_->heights.arrived_s[static_cast<std::size_t>(node.slot)]);
+    }
+    const double share = (residency_->now_s - youngest_s) / settings_.growth_s;
+    if (!(share < 1)) return;
+    const Level floor = level_of(minimum_exponent(parent)) - level_of_share(std::max(share, 0.0));
+    for (const std::int32_t child : parent.children) {
+        if (child < 0) continue;
+        CutNode& node = nodes_[static_cast<std::size_t>(child)];
+        node.floor = std::max(node.floor, floor);
+        if (node.visible() && node.level < floor) needs_floors_ = growing_ = true;
+    }
 }
 
-unsigned Cut::edge_mask(std::int32_t leaf) const {
-    const CutNode& node = nodes_[static_cast<std::size_t>(leaf)];
-    unsigned mask = 0;
-    for (const Direction direction : kDirections)
-        for_each_neighbour(leaf, direction, [&](std::int32_t other) {
-            if (nodes_[static_cast<std::size_t>(other)].exponent > node.exponent)
-                mask |= 1u << static_cast<int>(direction);
-        });
-    return mask;
+// Splits what asks for it, from node `first` on, children after their parents.
+void Cut::consider_from(std::size_t first) {
+    for (std::size_t k = first; k < nodes_.size() && pages_ <= settings_.max_pages; ++k) {
+        const CutNode& node = nodes_[k];
+        if (!node.visible() || node.split) continue;
+        if (node.wants_geometry || (node.texture_need > 1 && node.id.level < lattice_.deepest_level))
+            try_split(static_cast<std::int32_t>(k));
+    }
+}
+
+bool Cut::refine(std::span<const LodView> views, const CutSettings& settings, const Residency& residency) {
+    assert(views.size() <= kMaxViews);
+    views_ = views;
+    settings_ = settings;
+    residency_ = &residency;
+    nodes_.clear();
+    queue_.clear();
+    pages_ = steps_ = 0;
+    needs_floors_ = growing_ = false;
+    add_roots();
+    consider_from(0);
+    if (pages_ > settings_.max_pages) return false;
+    settle_levels();
+    if (pages_ > settings_.max_pages) return false;
+    if (needs_floors_) raise_to_floors();
+    return true;
+}
+
+void Cut::enqueue(std::int32_t index) {
+    CutNode& node = nodes_[static_cast<std::size_t>(index)];
+    if (node.queued || node.split || !node.visible()) return;
+    node.queued = true;
+    queue_.push_back(index);
+}
+
+void Cut::settle_levels() {
+    for (std::size_t k = 0; k < nodes_.size(); ++k) enqueue(static_cast<std::int32_t>(k));
+    for (std::size_t head = 0; head < queue_.size() && pages_ <= settings_.max_pages; ++head) {
+        nodes_[static_cast<std::size_t>(queue_[head])].queued = false;
+        if (!nodes_[static_cast<std::size_t>(queue_[head])].split) constrain_neighbours(queue_[head]);
+    }
+    queue_.clear();
+}
+
+// Applies the rules between a leaf and those beside it, both ways.
+void Cut::constrain_neighbours(std::int32_t index) {
+    const CutNode& start = nodes_[static_cast<std::size_t>(index)];
+    const Level level = start.level;
+    Level limit = level + kOneLevel;
+    // The finest surface is only inexact where its edges move: they may move no further than its tolerance allows.
+    if (start.id.level == lattice_.deepest_level && settings_.tau_px * start.metres_per_px < start.finest_error_m)
+        limit = std::min(limit, level_of_share(settings_.tau_px * start.metres_per_px / start.finest_error_m));
+    Level own_limit = level;
+    for (int d = 0; d < 4; ++d) {
+        for (;;) {
+            const std::int32_t other = neighbour(index, d);
+            if (other < 0) break;
+            const CutNode& beside = nodes_[static_cast<std::size_t>(other)];
+            if (beside.split) {
+                for_each_leaf_on(other, opposite(d), [&](std::int32_t smaller) {
+                    const Level theirs = nodes_[static_cast<std::size_t>(smaller)].level;
+                    own_limit = std::min(own_limit, theirs + kOneLevel);
+                    if (theirs > level) lower(smaller, level);
+                });
+                break;
+            }
+            if (!beside.visible()) break;
+            if (beside.level > limit && lower(other, limit)) continue;
+            // Anything may have moved in memory.
+            const CutNode& settled = nodes_[static_cast<std::size_t>(other)];
+            const bool larger = settled.id.level < nodes_[static_cast<std::size_t>(index)].id.level;
+            own_limit = std::min(own_limit, larger ? settled.level : settled.level + kOneLevel);
+            break;
+        }
+        if (nodes_[static_cast<std::size_t>(index)].split) return;
+    }
+    if (own_limit < nodes_[static_cast<std::size_t>(index)].level) lower(index, own_limit);
+}
+
+// Brings a leaf down to a level, by splitting it where its own mesh cannot be that fine. True if something changed.
+bool Cut::lower(std::int32_t index, Level limit) {
+    CutNode& node = nodes_[static_cast<std::size_t>(index)];
+    const Level finest = level_of(minimum_exponent(node));
+    bool changed = false;
+    if (node.level > std::max(limit, finest)) {
+        node.level = std::max(limit, finest);
+        enqueue(index);
+        lower_relatives(index, node.level);
+        changed = true;
+    }
+    if (limit >= finest) return changed;
+    const std::size_t first = nodes_.size();
+    if (node.id.level == lattice_.deepest_level || !try_split(index)) {
+        needs_floors_ = true;
+        return changed;
+    }
+    consider_from(first);
+    for (std::size_t k = first; k < nodes_.size(); ++k) enqueue(static_cast<std::int32_t>(k));
+    return true;
+}
+
+// No leaf is drawn coarser than an ancestor would be in its place, and that is no coarser than any leaf under it.
+void Cut::lower_relatives(std::int32_t index, Level limit) {
+    for (std::int32_t above = nodes_[static_cast<std::size_t>(index)].parent; above >= 0;
+         above = nodes_[static_cast<std::size_t>(above)].parent) {
+        const CutNode& node = nodes_[static_cast<std::size_t>(above)];
+        const Level lowered = std::max(limit, level_of(minimum_exponent(node)));
+        if (node.level <= lowered) return;
+        lower_descendants(above, lowered);
+    }
+}
+
+void Cut::lower_descendants(std::int32_t index, Level limit) {
+    CutNode& node = nodes_[static_cast<std::size_t>(index)];
+    if (node.level <= limit) return;
+    node.level = limit;
+    if (!node.split) {
+        enqueue(index);
+        return;
+    }
+    for (const std::int32_t child : node.children)
+        if (child >= 0) lower_descendants(child, limit);
+}
+
+// Where a page cannot be as fine as its neighbours want, or is still growing, the finer side stays coarse.
+void Cut::raise_to_floors() {
+    for (std::size_t k = 0; k < nodes_.size(); ++k) enqueue(static_cast<std::int32_t>(k));
+    for (std::size_t head = 0; head < queue_.size(); ++head) {
+        const std::int32_t index = queue_[head];
+        CutNode& node = nodes_[static_cast<std::size_t>(index)];
+        node.queued = false;
+        const Level floor = node.floor;
+        const int own_level = node.id.level;
+        for (int d = 0; d < 4; ++d)
+            for_each_neighbour(index, d, [&](std::int32_t other) {
+                CutNode& beside = nodes_[static_cast<std::size_t>(other)];
+                const Level least = std::min(beside.id.level < own_level ? floor : floor - kOneLevel,
+                                             level_of(maximum_exponent(beside)));
+                if (beside.floor >= least) return;
+                beside.floor = least;
+                enqueue(other);
+            });
+    }
+    queue_.clear();
+    for (CutNode& node : nodes_)
+        if (!node.split) node.level = std::max(node.level, node.floor);
+}
+
+Cut::Drawn Cut::drawn(std::int32_t index) {
+    const CutNode& node = nodes_[static_cast<std::size_t>(index)];
+    Drawn drawn;
+    drawn.exponent = exponent_of(node.level);
+    drawn.morph = morph_of(node.level);
+    for (int d = 0; d < 4; ++d) {
+        float& weight = drawn.edge_morph[static_cast<std::size_t>(d)];
+        weight = drawn.morph;
+        const std::int32_t other = neighbour(index, d);
+        if (other < 0) continue;
+        const CutNode& beside = nodes_[static_cast<std::size_t>(other)];
+        // A smaller page is the finer mesh: this leaf's level rules.
+        if (beside.split || !beside.visible() || beside.level <= node.level) continue;
+        weight = morph_of(beside.level);
+        if (exponent_of(beside.level) > drawn.exponent) drawn.edge_mask |= 1u << d;
+    }
+    return drawn;
+}
+
+double Cut::drawn_error_m(const CutNode& leaf, const Drawn& drawn) const {
+    const int geomip = drawn.exponent - minimum_exponent(leaf);
+    const double thinned_m = error_m(leaf, geomip);
+    const double coarser_m = geomip + 1 < lattice_.tile_cells_log2 ? error_m(leaf, geomip + 1) : thinned_m;
+    const double inner = drawn.morph;
+    if (drawn.exponent > 0 || drawn.edge_mask != 0) return (1 - inner) * thinned_m + inner * coarser_m;
+    // The finest surface is exact but for what has moved; an edge that moves further than the tile is half thinned.
+    const double edge =
+        std::max(inner, static_cast<double>(*std::max_element(drawn.edge_morph.begin(), drawn.edge_morph.end())));
+    return inner * coarser_m + (edge - inner) * thinned_m;
 }
 
 }  // namespace scree

@@ -1,5 +1,12 @@
-// Cut: the tree of nodes that selection refines, and the steps that keep it balanced. Used by Selector and by the tests
-// of balance; no policy here beyond "largest need first".
+// Cut: the tree of pages that selection refines, and the continuous level at which each leaf is drawn. No policy about
+// budgets or requests here; see selection.h. docs/lod-and-paging.md has the rules and why they suffice.
+//
+// Rules for two visible leaves that share an edge (Level: log2 of the stride drawn, continuous):
+//     L_B <= L_A + 1                      one exponent apart at most; a thinned edge never moves further than its tile
+//     L_A <= L_B  where A is the smaller page      the finer page is never the coarser mesh
+// and a page is never drawn coarser than its parent would be as a leaf: pages hand over without a jump.
+// The levels drawn are the greatest that satisfy these and the tolerance, so they do not depend on any order, and move
+// continuously with the eye.
 #pragma once
 
 #include <array>
@@ -8,6 +15,7 @@
 #include <vector>
 
 #include "common/dataset.h"
+#include "runtime/lod/level.h"
 #include "runtime/paging/residency.h"
 #include "runtime/view/camera.h"
 #include "runtime/view/frustum.h"
@@ -29,77 +37,103 @@ struct LodView {
     double near_m;
 };
 
+/// At most this many views a selection: CutNode::seen_by has a bit each.
+inline constexpr std::size_t kMaxViews = 32;
+
 enum class Direction : int { north = 0, east = 1, south = 2, west = 3 };
 inline constexpr std::array<Direction, 4> kDirections{Direction::north, Direction::east, Direction::south,
                                                       Direction::west};
 
 struct CutNode {
     TileId id;
-    HeightBounds bounds;
-    const HeightTileHeader* header = nullptr;  ///< null while the tile is not resident
-    std::int32_t slot = -1;
+    const HeightBounds* bounds = nullptr;
+    std::int32_t slot = kNotResident;          ///< of its height tile
+    std::int32_t texture_slot = kNotResident;  ///< of the texture tile of the same address
     std::int32_t parent = -1;
-    std::array<std::int32_t, 4> children{-1, -1, -1, -1};  ///< -1: does not exist, or the node is not split
-    std::int32_t exponent = 0;                             ///< log2 of the stride drawn, in finest cells
+    std::array<std::int32_t, 4> children{-1, -1, -1, -1};    ///< -1: does not exist, or the node is not split
+    std::array<std::int32_t, 4> neighbours{-1, -1, -1, -1};  ///< by Direction: a node as large or larger, or -1
+    Level level = 0;            ///< drawn; of a split node: what it would be drawn at as a leaf
+    Level floor = 0;            ///< least level that it can be drawn at in this cut
+    std::uint32_t seen_by = 0;  ///< views that may see its box; without any it is neither refined nor drawn
+    std::uint32_t inside = 0;   ///< views that see all of its box
     bool split = false;
-    bool visible = false;      ///< in any view; invisible nodes are never refined or drawn
-    bool blocked = false;      ///< a step failed; it would fail again
-    double metres_per_px = 0;  ///< smallest over the views that see it of d / (f K): error allowed for one pixel
-    double texel_per_px = 0;   ///< smallest over the views of d / f: metres of texture a pixel covers
-    double priority = 0;       ///< need of the parent when it was split
+    bool wants_geometry = false;  ///< its finest mesh is not good enough
+    bool queued = false;
+    double metres_per_px = 0;   ///< least over the views that see it of d / (f K): error allowed for one pixel
+    double texel_per_px = 0;    ///< least over the views of d / f: metres of texture a pixel covers
+    double finest_error_m = 0;  ///< of its own densest mesh, thinned edges included
+    double texture_need = 0;    ///< of its own texture over the tolerance, where finer textures exist
+    double priority = 0;        ///< need of the parent when it was split
+
+    bool visible() const { return seen_by != 0; }
 };
 
 struct CutSettings {
     double tau_px = 1;
     double texture_tau_px = 1;
-    std::int64_t max_pages = 0;  ///< visible nodes, split ones included
+    std::int64_t max_pages = 0;  ///< visible nodes, split ones included; the walk is given up beyond
     bool only_resident = false;  ///< true: split only where the visible children are resident
+    double half_curvature = 0;   ///< 1 / (2 R), 1/m
+    /// Seconds in which a page that came late grows out of its parent's shape by one level; 0: at once.
+    double growth_s = 0;
 };
+
+/// A box as it is seen over a curved earth: lowered by the least and the greatest drop within it.
+Box lowered_by_curvature(Box box, glm::dvec3 eye, double half_curvature);
 
 class Cut {
 public:
     explicit Cut(const Dataset& dataset);
 
-    /// Starts from the roots and refines until nothing is needed or possible.
-    void refine(std::span<const LodView> views, const CutSettings& settings, const Residency& residency);
+    /// Makes the cut anew. False: more than max_pages would be needed; the cut is then unusable.
+    bool refine(std::span<const LodView> views, const CutSettings& settings, const Residency& residency);
 
+    /// Parents come before their children.
     const std::vector<CutNode>& nodes() const { return nodes_; }
-    bool page_limited() const { return page_limited_; }
     std::int64_t pages() const { return pages_; }
     std::int64_t steps() const { return steps_; }
+    /// Some page is still growing: the picture will change though nothing moves.
+    bool growing() const { return growing_; }
 
     Box box_of(const CutNode& node) const;
-    /// Error of a leaf as drawn: 0 for the finest surface with no thinned edge.
-    double drawn_error_m(std::int32_t leaf) const;
-    /// Edges of a visible leaf at which a neighbour is drawn at twice its stride.
-    unsigned edge_mask(std::int32_t leaf) const;
-    /// Visits the visible leaves across one side of a leaf.
-    template <class Visit>
-    void for_each_neighbour(std::int32_t leaf, Direction direction, const Visit& visit) const;
     int minimum_exponent(const CutNode& node) const { return lattice_.deepest_level - node.id.level; }
     int maximum_exponent(const CutNode& node) const { return minimum_exponent(node) + lattice_.tile_cells_log2 - 1; }
 
-private:
-    struct HeapEntry {
-        double need;
-        std::int32_t node;
-        std::int32_t exponent;  ///< entries of an older state are skipped
+    /// How a visible leaf is drawn.
+    struct Drawn {
+        int exponent = 0;
+        unsigned edge_mask = 0;
+        float morph = 0;
+        std::array<float, 4> edge_morph{};
     };
-    std::int32_t find(TileId id) const;
+    Drawn drawn(std::int32_t leaf);
+    /// Greatest error of a leaf drawn so, metres.
+    double drawn_error_m(const CutNode& leaf, const Drawn& drawn) const;
+
+private:
+    std::int32_t neighbour(std::int32_t node, int direction);
     template <class Visit>
-    void visit_side(std::int32_t node, Direction side, const Visit& visit) const;
-    std::int32_t add_node(TileId id, const HeightBounds& bounds, std::int32_t parent, const Residency& residency);
-    void measure(CutNode& node) const;
-    double error_need(const CutNode& node, double error_m) const;
-    double geometry_need(std::int32_t node) const;
-    double texture_need(const CutNode& node) const;
-    void push(std::int32_t node);
-    bool step(std::int32_t node);
-    bool may_split_now(std::int32_t node) const;
-    bool try_reduce(std::int32_t node);
-    bool try_split(std::int32_t node, double priority);
-    bool lower_towards(std::int32_t neighbour, int exponent);
-    bool refine_thinned_neighbours(std::int32_t node);
+    void for_each_leaf_on(std::int32_t node, int side, const Visit& visit) const;
+    template <class Visit>
+    void for_each_neighbour(std::int32_t leaf, int direction, const Visit& visit);
+
+    std::int32_t add_node(TileId id, const HeightBounds& bounds, std::int32_t slot, std::int32_t texture_slot,
+                          std::int32_t parent);
+    void measure(CutNode& node, std::uint32_t candidates, std::uint32_t inside) const;
+    void judge(CutNode& node, double parent_error_m) const;
+    void judge_texture(CutNode& node) const;
+    double error_m(const CutNode& node, int geomip) const;
+    void add_roots();
+    void consider_from(std::size_t first);
+    bool try_split(std::int32_t node);
+    void grow(std::int32_t parent);
+    void settle_levels();
+    void constrain_neighbours(std::int32_t leaf);
+    bool lower(std::int32_t leaf, Level limit);
+    void lower_relatives(std::int32_t node, Level limit);
+    void lower_descendants(std::int32_t node, Level limit);
+    void raise_to_floors();
+    void enqueue(std::int32_t leaf);
 
     const Dataset& dataset_;
     const Lattice lattice_;
@@ -108,46 +142,10 @@ private:
     const Residency* residency_ = nullptr;
     std::vector<CutNode> nodes_;
     std::vector<std::int32_t> roots_;
-    std::vector<HeapEntry> heap_;
+    std::vector<std::int32_t> queue_;
     std::int64_t pages_ = 0, steps_ = 0;
-    bool page_limited_ = false;
+    bool needs_floors_ = false;
+    bool growing_ = false;
 };
-
-template <class Visit>
-void Cut::visit_side(std::int32_t index, Direction side, const Visit& visit) const {
-    const CutNode& node = nodes_[static_cast<std::size_t>(index)];
-    if (!node.split) {
-        if (node.visible) visit(index);
-        return;
-    }
-    // The two children that touch `side` of the node.
-    static constexpr std::array<std::array<int, 2>, 4> kTouching{{{0, 1}, {1, 3}, {2, 3}, {0, 2}}};
-    for (const int q : kTouching[static_cast<std::size_t>(side)])
-        if (const std::int32_t child = node.children[static_cast<std::size_t>(q)]; child >= 0)
-            visit_side(child, side, visit);
-}
-
-template <class Visit>
-void Cut::for_each_neighbour(std::int32_t leaf, Direction direction, const Visit& visit) const {
-    TileId id = nodes_[static_cast<std::size_t>(leaf)].id;
-    switch (direction) {
-        case Direction::north:
-            --id.y;
-            break;
-        case Direction::east:
-            ++id.x;
-            break;
-        case Direction::south:
-            ++id.y;
-            break;
-        case Direction::west:
-            --id.x;
-            break;
-    }
-    const std::int32_t found = find(id);
-    if (found < 0) return;
-    const auto opposite = static_cast<Direction>((static_cast<int>(direction) + 2) % 4);
-    visit_side(found, opposite, visit);
-}
 
 }  // namespace scree

@@ -1,10 +1,10 @@
 // Selection: which tiles to draw, how densely, and which to fetch. A pure function of (views, tile headers, residency,
-// settings): no OpenGL, no thread, no clock; the Selector object only keeps its buffers (docs/lod-and-paging.md).
+// settings): no OpenGL, no thread, no clock of its own; the Selector object only keeps its buffers
+// (docs/lod-and-paging.md).
 //
-// A cut through the height pyramid is refined greedily, largest projected error first, from the roots at their
-// coarsest. Page (which tile) and density (which geomip level inside it) are compared as absolute strides; every step
-// keeps the cut balanced: across an edge strides differ by at most 2 : 1 and the finer page is never the coarser mesh.
-// Test: f K eps > tau max(d_box, near)   (Scree lod, section 5.1; f, K of runtime/view/camera.h).
+// A cut through the height pyramid is refined from the roots where the promise asks for it; runtime/lod/cut.h has the
+// rules that keep it balanced and continuous. Test: f K eps > tau max(d_box, near)   (Scree lod, section 5.1; f, K of
+// runtime/view/camera.h).
 #pragma once
 
 #include <cstdint>
@@ -26,19 +26,27 @@ struct SelectionSettings {
         1;  ///< screen pixels a texel may cover: smaller is sharper and costs texture slots (1/tau^2)
     std::int64_t height_slots = 0;  ///< tiles that can be kept, parents of what is drawn included
     std::int64_t texture_slots = 0;
+    double half_curvature = 0;  ///< 1 / (2 R) of the earth, 1/m; 0: flat
+    bool morph = true;          ///< false: discrete levels
+    /// Seconds in which what came late grows out of what stood in for it: a level of heights, a texture. 0: at once.
+    double growth_s = 0;
 };
 
 struct Selection {
     std::vector<DrawList> draws;  ///< one list a view, an item a tile
     /// The same for the renderer, tiles under deep textures in parts. Empty where the store has none: draw `draws`.
     std::vector<DrawList> parts;
-    std::vector<TileRequest> requests;    ///< most urgent first; nothing that could not be kept
-    std::vector<TileId> planned_heights;  ///< what full residency would keep, ancestors included: never to be evicted
-    std::vector<TileId> planned_textures;
-    std::vector<TileId> standing_in;  ///< height tiles drawn or needed by what is drawn, planned or not: evict last
-    std::vector<TileId> standing_in_textures;
+    std::vector<TileRequest> requests;  ///< most urgent first; nothing that could not be kept
+    /// Slots of resident tiles that full residency would keep, parents before children: never to be evicted.
+    std::vector<std::int32_t> planned_heights, planned_textures;
+    /// Slots of tiles drawn or needed by what is drawn, planned or not: evict last.
+    std::vector<std::int32_t> standing_heights, standing_textures;
     double max_bound_px = 0;      ///< the promise: no drawn point is further from the finest surface on screen
+    double mean_bound_px = 0;     ///< over the tiles drawn, weighted by the share of the screen they may cover
+    double tau_effective_px = 0;  ///< the tolerance that the slots allow: settings.tau_px unless they bind
+    double texture_tau_effective_px = 0;
     bool complete = false;        ///< everything planned is resident and drawn
+    bool growing = false;         ///< late tiles are still on their way out of their parents' shape
     bool budget_limited = false;  ///< slots bound before tau did
     std::int64_t triangles = 0;   ///< over all views
     std::int64_t nodes = 0;       ///< drawn in any view
@@ -53,8 +61,8 @@ public:
     ~Selector();
     Selector(Selector&&) noexcept;
 
-    /// The result is valid until the next call. A root that is not resident is taken for one that is
-    /// not stored: the pager pins them.
+    /// The result is valid until the next call. A root that is not resident is taken for one that is not stored: the
+    /// pager pins them. At most kMaxViews views.
     const Selection& select(std::span<const Camera> views, const SelectionSettings& settings,
                             const Residency& residency);
 

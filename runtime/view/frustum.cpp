@@ -26,6 +26,23 @@ bool Frustum::may_see(const Box& box) const {
     return true;
 }
 
+Sight Frustum::sight(const Box& box) const {
+    const glm::dvec3 middle = 0.5 * (box.low + box.high) - eye_, half = 0.5 * (box.high - box.low);
+    // Nearest and furthest signed distance along a normal are the middle's, less and plus this reach.
+    const auto reach = [&](const glm::dvec3& n) { return glm::dot(glm::abs(n), half); };
+    double depth = glm::dot(forward_, middle) - near_m_;
+    double span = reach(forward_);
+    if (!(depth + span >= 0)) return Sight::none;
+    bool all = depth >= span;
+    for (const glm::dvec3& n : normals_) {
+        depth = glm::dot(n, middle);
+        span = reach(n);
+        if (!(depth + span >= 0)) return Sight::none;
+        all = all && depth >= span;
+    }
+    return all ? Sight::all : Sight::some;
+}
+
 bool Frustum::contains(glm::dvec3 point) const {
     const glm::dvec3 p = point - eye_;
     if (!(glm::dot(p, forward_) >= near_m_)) return false;

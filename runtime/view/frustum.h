@@ -19,9 +19,13 @@ struct Box {
 /// Distance from a point to a box, 0 inside.
 double distance_to_box(glm::dvec3 point, const Box& box);
 
+enum class Sight { none, some, all };
+
 class Frustum {
 public:
     explicit Frustum(const Camera& camera);
+    /// none only if no point of the box is in view; all only if every point is.
+    Sight sight(const Box& box) const;
     /// False only if no point of the box is in view.
     bool may_see(const Box& box) const;
     bool contains(glm::dvec3 point) const;
