@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include "common/mesh/drawn_surface.h"
 #include "common/mesh/geometric_error.h"
 #include "common/store/height_codec.h"
+#include "runtime/app/drawn_tile.h"
 #include "runtime/view/frustum.h"
 
 namespace scree {
@@ -24,6 +24,32 @@ struct Projector {
         const double depth = glm::dot(p, forward);
         return focal / depth * glm::dvec2(glm::dot(p, right), glm::dot(p, up));
     }
+};
+
+// Compares true points with the drawn surface above or below them.
+class Judge {
+public:
+    explicit Judge(const AuditedFrame& frame)
+        : eye_(frame.camera.eye),
+          half_curvature_(frame.half_curvature),
+          frustum_(frame.camera),
+          project_(frame.camera) {}
+
+    /// (u, v): the point's place on the tile, finest cells.
+    void add(glm::dvec3 truth, const DrawnTile& tile, double u, double v, ErrorHistogram& errors) const {
+        const double dx = truth.x - eye_.x, dy = truth.y - eye_.y;
+        truth.z -= (dx * dx + dy * dy) * half_curvature_;
+        if (!frustum_.contains(truth)) return;
+        const glm::dvec3 shown = tile.at(u, v);
+        if (!frustum_.contains(shown + eye_)) return;
+        errors.add(glm::length(project_(truth - eye_) - project_(shown)));
+    }
+
+private:
+    glm::dvec3 eye_;
+    double half_curvature_;
+    Frustum frustum_;
+    Projector project_;
 };
 
 }  // namespace
@@ -54,19 +80,19 @@ double ErrorHistogram::quantile(double q) const {
     return max_;
 }
 
-Result<void> audit_frame(const TileStore& store, TileReader& reader, const Camera& camera, const DrawList& draws,
-                         const CpuArena& arena, ErrorHistogram& errors) {
+Result<void> audit_frame(const TileStore& store, TileReader& reader, const AuditedFrame& frame,
+                         ErrorHistogram& errors) {
     const Dataset& d = store.dataset();
     const Lattice& l = d.lattice;
     const int n = l.tile_cells_log2;
     const std::int64_t m = l.tile_cells();
-    const Frustum frustum(camera);
-    const Projector project(camera);
+    const Judge judge(frame);
+    DrawnTile drawn(
+        l, make_relative_frame(l, d.height_offset_m, d.height_quantum_m, frame.camera.eye, frame.half_curvature));
     TileRow row;
-    for (const DrawItem& item : draws) {
-        const auto drawn = arena.heights(item.height_slot);
+    for (const DrawItem& item : frame.draws) {
+        drawn.set(item, frame.arena.vertices(item.height_slot));
         const LatticePoint corner = l.corner(item.tile);
-        const std::int64_t step = l.step(item.tile.level);
         const int up = l.deepest_level - item.tile.level;
         for (std::int64_t y = item.tile.y << up; y < (item.tile.y + 1) << up; ++y)
             for (std::int64_t x = item.tile.x << up; x < (item.tile.x + 1) << up; ++x) {
@@ -85,16 +111,8 @@ Result<void> audit_frame(const TileStore& store, TileReader& reader, const Camer
                         const std::int64_t i = x * m + c, j = y * m + r;
                         const glm::dvec3 truth{l.x_m(static_cast<double>(i)), l.y_m(static_cast<double>(j)),
                                                d.height_m(tile->samples[k])};
-                        if (!frustum.contains(truth)) continue;
-                        const ExactHeight z =
-                            drawn_height(drawn, n, {item.geomip, item.edge_mask}, i - corner.i, j - corner.j, step);
-                        if (z.numerator == z.denominator * tile->samples[k]) {
-                            errors.add(0);
-                            continue;
-                        }
-                        const glm::dvec3 shown{truth.x, truth.y, d.height_m(z.quanta())};
-                        if (!frustum.contains(shown)) continue;
-                        errors.add(glm::length(project(truth - camera.eye) - project(shown - camera.eye)));
+                        judge.add(truth, drawn, static_cast<double>(i - corner.i), static_cast<double>(j - corner.j),
+                                  errors);
                     }
             }
     }

@@ -32,8 +32,15 @@ private:
     double max_ = 0, sum_ = 0;
 };
 
-/// Adds one drawn frame. Errors: those of the store.
-Result<void> audit_frame(const TileStore& store, TileReader& reader, const Camera& camera, const DrawList& draws,
-                         const CpuArena& arena, ErrorHistogram& errors);
+/// One drawn frame: what was drawn, from where.
+struct AuditedFrame {
+    const Camera& camera;
+    const DrawList& draws;
+    const CpuArena& arena;
+    double half_curvature = 0;  ///< the truth is lowered by it as well, exactly
+};
+
+/// Adds the errors of one drawn frame against the store's finest tiles. Errors: those of the store.
+Result<void> audit_frame(const TileStore& store, TileReader& reader, const AuditedFrame& frame, ErrorHistogram& errors);
 
 }  // namespace scree

@@ -1,15 +1,17 @@
 #include "runtime/app/cpu_arena.h"
 
+#include <algorithm>
+
 namespace scree {
 
 CpuArena::CpuArena(const Dataset& dataset, std::int64_t height_slots, TileSink* next)
-    : samples_(static_cast<std::size_t>(dataset.lattice.tile_samples() * dataset.lattice.tile_samples())),
-      heights_(samples_ * static_cast<std::size_t>(height_slots)),
+    : slot_vertices_(slot_vertex_count(dataset.lattice.tile_cells_log2)),
+      vertices_(slot_vertices_ * static_cast<std::size_t>(height_slots)),
       next_(next) {}
 
 void CpuArena::put_height(std::int32_t slot, std::span<const SlotVertex> vertices) {
-    std::int32_t* out = heights_.data() + samples_ * static_cast<std::size_t>(slot);
-    for (std::size_t k = 0; k < samples_; ++k) out[k] = static_cast<std::int32_t>(vertices[k].height_n);
+    std::copy(vertices.begin(), vertices.end(),
+              vertices_.begin() + static_cast<std::ptrdiff_t>(slot_vertices_ * static_cast<std::size_t>(slot)));
     if (next_ != nullptr) next_->put_height(slot, vertices);
 }
 
@@ -17,8 +19,8 @@ void CpuArena::put_texture(std::int32_t slot, std::span<const std::uint8_t> chai
     if (next_ != nullptr) next_->put_texture(slot, chain);
 }
 
-std::span<const std::int32_t> CpuArena::heights(std::int32_t slot) const {
-    return {heights_.data() + samples_ * static_cast<std::size_t>(slot), samples_};
+std::span<const SlotVertex> CpuArena::vertices(std::int32_t slot) const {
+    return {vertices_.data() + slot_vertices_ * static_cast<std::size_t>(slot), slot_vertices_};
 }
 
 }  // namespace scree

@@ -5,7 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "runtime/paging/pager.h"
+#include "common/dataset.h"
+#include "runtime/paging/tile_sink.h"
 
 namespace scree {
 
@@ -14,12 +15,12 @@ public:
     CpuArena(const Dataset& dataset, std::int64_t height_slots, TileSink* next = nullptr);
     void put_height(std::int32_t slot, std::span<const SlotVertex> vertices) override;
     void put_texture(std::int32_t slot, std::span<const std::uint8_t> chain) override;
-    /// The (m+1)^2 heights of a slot, quanta.
-    std::span<const std::int32_t> heights(std::int32_t slot) const;
+    /// The (m+1)^2 vertices of a slot.
+    std::span<const SlotVertex> vertices(std::int32_t slot) const;
 
 private:
-    std::size_t samples_;
-    std::vector<std::int32_t> heights_;
+    std::size_t slot_vertices_;
+    std::vector<SlotVertex> vertices_;
     TileSink* next_;
 };
 

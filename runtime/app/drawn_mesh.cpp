@@ -8,6 +8,7 @@
 #include <cstring>
 #include <unordered_set>
 
+#include "common/mesh/morphed_vertex.h"
 #include "common/report.h"
 
 namespace scree {
@@ -54,14 +55,20 @@ DrawnMesh drawn_mesh(const Dataset& d, const TilePatterns& patterns, const DrawL
     DrawnMesh mesh;
     const auto pitch = static_cast<std::uint32_t>(d.lattice.tile_samples());
     for (const DrawItem& item : draws) {
-        const auto heights = arena.heights(item.height_slot);
+        const auto vertices = arena.vertices(item.height_slot);
+        const MorphedPattern pattern{item.geomip, item.edge_mask, item.morph, item.edge_morph};
         const LatticePoint corner = d.lattice.corner(item.tile);
         const std::int64_t step = d.lattice.step(item.tile.level);
+        const float side_m = static_cast<float>(step) * static_cast<float>(d.lattice.spacing_m);
         const PatternRange range = patterns.range(item.geomip, item.edge_mask);
         for (std::uint32_t k = range.first; k < range.first + range.count; ++k) {
             const std::uint32_t index = patterns.indices()[k];
+            const VertexMorph morph = vertex_morph(static_cast<int>(index % pitch), static_cast<int>(index / pitch),
+                                                   d.lattice.tile_cells_log2, pattern);
             mesh.corners.push_back({static_cast<std::int32_t>(corner.i + index % pitch * step),
-                                    static_cast<std::int32_t>(corner.j + index / pitch * step), heights[index]});
+                                    static_cast<std::int32_t>(corner.j + index / pitch * step),
+                                    morphed_height(vertices[index].height_n, vertices[index].next_n, morph.weight),
+                                    morph.weight * (morph.reach_squared * (side_m * side_m))});
         }
     }
     return mesh;
@@ -106,7 +113,8 @@ CrackReport count_cracks(const Dataset& d, const DrawList& draws, const DrawnMes
     return report;
 }
 
-Result<void> write_ply(const std::string& file, const Dataset& d, const DrawnMesh& mesh) {
+Result<void> write_ply(const std::string& file, const Dataset& d, const DrawnMesh& mesh, glm::dvec3 eye,
+                       double half_curvature) {
     static_assert(std::endian::native == std::endian::little);
     std::vector<LatticeVertex> vertices = mesh.corners;
     std::sort(vertices.begin(), vertices.end());
@@ -124,9 +132,12 @@ Result<void> write_ply(const std::string& file, const Dataset& d, const DrawnMes
         text.append(bytes, sizeof value);
     };
     for (const LatticeVertex& v : vertices) {
-        append(d.lattice.x_m(v.i));
-        append(d.lattice.y_m(v.j));
-        append(d.height_m(v.n));
+        const double x = d.lattice.x_m(v.i), y = d.lattice.y_m(v.j);
+        append(x);
+        append(y);
+        const double across =
+            (x - eye.x) * (x - eye.x) + (y - eye.y) * (y - eye.y) + static_cast<double>(v.morph_reach_m2);
+        append(d.height_m(v.n) - across * half_curvature);
     }
     for (std::size_t t = 0; t < mesh.corners.size(); t += 3) {
         text.push_back(3);

@@ -1,9 +1,12 @@
-// The drawn triangles as lattice integers: what audits check for cracks and `shot --mesh` writes for others to check.
+// The drawn triangles on the lattice, with morphed heights: what audits check for cracks and `shot --mesh` writes for
+// others to check. Heights are the floats that the vertex shader computes, so shared vertices compare bit for bit.
 #pragma once
 
 #include <cstdint>
 #include <string>
 #include <vector>
+
+#include <glm/glm.hpp>
 
 #include "common/dataset.h"
 #include "common/mesh/tile_patterns.h"
@@ -13,7 +16,9 @@
 namespace scree {
 
 struct LatticeVertex {
-    std::int32_t i = 0, j = 0, n = 0;
+    std::int32_t i = 0, j = 0;
+    float n = 0;               ///< height in quanta
+    float morph_reach_m2 = 0;  ///< what curvature adds to the squared distance (RelativeFrame::position)
     friend auto operator<=>(const LatticeVertex&, const LatticeVertex&) = default;
 };
 
@@ -33,7 +38,9 @@ struct CrackReport {
 /// Counts cracks. Edges on the border of what is drawn (culled, absent, end of the data) are no cracks.
 CrackReport count_cracks(const Dataset& dataset, const DrawList& draws, const DrawnMesh& mesh);
 
-/// Binary PLY, vertices as doubles in the dataset's coordinates, shared between triangles. Whole or absent.
-Result<void> write_ply(const std::string& file, const Dataset& dataset, const DrawnMesh& mesh);
+/// Binary PLY, vertices as doubles in the dataset's coordinates, shared between triangles; z is lowered by curvature as
+/// seen from `eye` where `half_curvature` is not 0. Whole or absent.
+Result<void> write_ply(const std::string& file, const Dataset& dataset, const DrawnMesh& mesh, glm::dvec3 eye,
+                       double half_curvature);
 
 }  // namespace scree

@@ -123,7 +123,7 @@ struct Selector::Impl {
         use_standing_ = !heights_complete;
     }
 
-    void emit(Cut& cut, const SelectionSettings& settings, const Residency& residency) {
+    void emit(Cut& cut, const SelectionSettings& settings) {
         const int n = dataset.lattice.tile_cells_log2;
         const auto& nodes = cut.nodes();
         double weights = 0;
@@ -189,7 +189,7 @@ struct Selector::Impl {
         request_missing(residency);
         if (!use_standing_) {
             // What is planned is what is drawn; textures that are still to come are stood in for.
-            emit(plan, settings, residency);
+            emit(plan, settings);
             textures.used(result.standing_textures);
             return;
         }
@@ -203,7 +203,7 @@ struct Selector::Impl {
         for (const CutNode& node : standing.nodes())
             if (node.visible()) result.standing_heights.push_back(node.slot);
         textures.wish(standing, views, cut, residency);
-        emit(standing, settings, residency);
+        emit(standing, settings);
         textures.used(result.standing_textures);
     }
 

@@ -17,16 +17,9 @@
 #include "runtime/paging/residency.h"
 #include "runtime/paging/tile_cache.h"
 #include "runtime/paging/tile_request.h"
+#include "runtime/paging/tile_sink.h"
 
 namespace scree {
-
-/// Where arriving tiles go: a renderer's arenas, or arrays of the CPU.
-class TileSink {
-public:
-    virtual ~TileSink() = default;
-    virtual void put_height(std::int32_t slot, std::span<const SlotVertex> vertices) = 0;
-    virtual void put_texture(std::int32_t slot, std::span<const std::uint8_t> chain) = 0;
-};
 
 struct PagerOptions {
     MemoryPlan memory;
