@@ -11,6 +11,8 @@
 #include "common/store/sqlite_store.h"
 #include "runtime/lod/selection.h"
 #include "runtime/paging/pager.h"
+#include "runtime/view/curvature.h"
+#include "runtime/view/foresight.h"
 
 namespace scree {
 
@@ -18,6 +20,10 @@ struct SceneOptions {
     std::int64_t budget_bytes = std::int64_t{256} << 20;  ///< ceiling of tile memory, staging included
     double tau_px = 1;
     double texture_tau_px = 1;
+    Curvature curvature = Curvature::automatic;
+    bool morph = true;       ///< false: discrete levels
+    double growth_s = 0.15;  ///< in which a tile that came late grows out of what stood in for it
+    double foresight_s = 1;  ///< how far ahead of the eye tiles are fetched; 0: not at all
     int loader_threads = 2;
     int latency_ms = 0;
     bool textures = true;
@@ -27,7 +33,8 @@ struct SceneOptions {
 /// Times and counts of one frame's thinking, before anything is drawn.
 struct SceneFrame {
     const Selection* selection = nullptr;
-    double select_ms = 0;
+    double half_curvature = 0;
+    double select_ms = 0;  ///< selection and requests
     std::int64_t uploads = 0;
     bool stand_ins = false;  ///< drawn coarser than full residency would
 };
@@ -44,20 +51,31 @@ public:
     const Pager& pager() const { return *pager_; }
     SceneOptions& options() { return options_; }
 
-    /// One frame's arrivals, selection and requests. The selection is valid until the next call.
-    SceneFrame advance(std::span<const Camera> views);
-    /// The same until nothing is missing. Errors: ErrorCode::store if what is missing never comes.
+    /// One frame's arrivals, selection and requests at `now_s`, a clock that only has to move forward. The selection is
+    /// valid until the next call.
+    SceneFrame advance(std::span<const Camera> views, double now_s);
+    /// advance() again and again until nothing is missing or `seconds` have passed: a first picture that is not coarse.
+    SceneFrame catch_up(std::span<const Camera> views, double now_s, double seconds);
+    /// The same until nothing is missing, and nothing grows. Errors: ErrorCode::store if what is missing never comes.
     Result<SceneFrame> complete(std::span<const Camera> views, const std::function<bool()>& stop = {});
 
 private:
     Scene(const SqliteStore& store, const SceneOptions& options, const MemoryPlan& memory);
-    SceneFrame think(std::span<const Camera> views);
+    SceneFrame think(std::span<const Camera> views, double growth_s);
+    SelectionSettings selection_settings(double half_curvature, double growth_s) const;
+    void look_ahead(std::span<const Camera> views, const SelectionSettings& settings);
 
     const SqliteStore& store_;
     SceneOptions options_;
     MemoryPlan memory_;
     std::unique_ptr<Pager> pager_;
     Selector selector_;
+    Selector ahead_;
+    Foresight foresight_;
+    const Selection* foreseen_ = nullptr;  ///< of the last look ahead; null: none
+    std::vector<std::int32_t> standing_heights_, standing_textures_;
+    std::vector<TileRequest> requests_;
+    std::uint64_t frame_ = 0;
 };
 
 }  // namespace scree
