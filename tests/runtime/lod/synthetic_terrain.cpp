@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <unordered_set>
 
 #include "common/mesh/geometric_error.h"
 
@@ -145,10 +147,16 @@ std::int32_t SyntheticTerrain::index(TileId id) const {
     return found == indices_.end() ? -1 : found->second;
 }
 
+std::uint8_t SyntheticTerrain::texture_children(TileId id) const {
+    unsigned mask = 0;
+    for (int q = 0; q < 4; ++q)
+        if (has_texture(child_of(id, q))) mask |= 1u << q;
+    return static_cast<std::uint8_t>(mask);
+}
+
 TextureTile SyntheticTerrain::texture(TileId id) const {
     TextureTile texture;
-    for (int q = 0; q < 4; ++q)
-        if (has_texture(child_of(id, q))) texture.child_mask = static_cast<std::uint8_t>(texture.child_mask | 1 << q);
+    texture.child_mask = texture_children(id);
     texture.blocks.assign(bc1_chain_bytes(dataset_.texture_size_log2), 0);
     // The tile's own index, so that a slot's content says whose it is.
     for (std::size_t k = 0; k < 4; ++k) texture.blocks[k] = static_cast<std::uint8_t>(texture_index(id) >> (8 * k));
@@ -239,38 +247,97 @@ Camera random_camera(Random& random, const SyntheticTerrain& terrain) {
     return *camera;
 }
 
+FakeResidency::FakeResidency(const SyntheticTerrain& terrain) : terrain_(&terrain) {
+    for (const TileKind kind : {TileKind::height, TileKind::texture}) {
+        ResidentPages& pages = tables_.of(kind);
+        const std::size_t count = ids(kind).size();
+        states_[static_cast<std::size_t>(kind)].assign(count, State::absent);
+        pages.arrived_s.assign(count, -std::numeric_limits<double>::infinity());
+        pages.children.resize(count);
+        pages.headers.resize(count);
+        for (std::size_t slot = 0; slot < count; ++slot) {
+            const TileId id = ids(kind)[slot];
+            if (kind == TileKind::height)
+                pages.headers[slot] = terrain.tile(id)->header;
+            else
+                pages.headers[slot].child_mask = terrain.texture_children(id);
+        }
+    }
+}
+
 void FakeResidency::add_all() {
-    heights_.insert(terrain_->tiles().begin(), terrain_->tiles().end());
-    textures_.insert(terrain_->textures().begin(), terrain_->textures().end());
+    for (const TileId id : terrain_->tiles()) add(id);
+    for (const TileId id : terrain_->textures()) add_texture(id);
 }
 
 void FakeResidency::add_roots() {
     for (const TileId id : terrain_->tiles())
         if (id.level == 0) {
-            heights_.insert(id);
-            textures_.insert(id);
+            add(id);
+            add_texture(id);
         }
 }
 
 void FakeResidency::add_random(Random& random, int percent) {
     add_roots();
     for (const TileId id : terrain_->tiles())
-        if (uniform(random, 0, 99) < percent) heights_.insert(id);
+        if (uniform(random, 0, 99) < percent) add(id);
     for (const TileId id : terrain_->textures())
-        if (uniform(random, 0, 99) < percent) textures_.insert(id);
+        if (uniform(random, 0, 99) < percent) add_texture(id);
 }
 
-ResidentHeight FakeResidency::height(TileId id) const {
-    if (!heights_.contains(id)) return {};
-    return {&terrain_->tile(id)->header, terrain_->index(id)};
+FakeResidency::State FakeResidency::state(TileKind kind, TileId id) const {
+    const std::int32_t slot = index(kind, id);
+    return slot < 0 ? State::absent : states_[static_cast<std::size_t>(kind)][static_cast<std::size_t>(slot)];
 }
 
-std::int32_t FakeResidency::texture(TileId id) const {
-    return textures_.contains(id) ? terrain_->texture_index(id) : -1;
+void FakeResidency::change(TileKind kind, TileId id, State to) {
+    const std::int32_t slot = index(kind, id);
+    if (slot < 0) return;  // not stored
+    states_[static_cast<std::size_t>(kind)][static_cast<std::size_t>(slot)] = to;
+    stale_ = true;
 }
 
-std::uint8_t FakeResidency::texture_children(TileId id) const {
-    return textures_.contains(id) ? terrain_->texture(id).child_mask : std::uint8_t{0};
+void FakeResidency::set_arrived(TileKind kind, TileId id, double seconds) {
+    tables_.of(kind).arrived_s.at(static_cast<std::size_t>(index(kind, id))) = seconds;
+}
+
+void FakeResidency::set_has_textures(bool has) {
+    tables_.has_textures = has;
+    stale_ = true;
+}
+
+const Residency& FakeResidency::tables() const {
+    if (stale_) {
+        link(TileKind::height);
+        link(TileKind::texture);
+        stale_ = false;
+    }
+    return tables_;
+}
+
+std::int32_t FakeResidency::entry(TileKind kind, TileId id) const {
+    if (kind == TileKind::texture && !tables_.has_textures) return kNotResident;
+    switch (state(kind, id)) {
+        case State::absent:
+            return kNotResident;
+        case State::unavailable:
+            return kUnavailable;
+        case State::resident:
+            return index(kind, id);
+    }
+    return kNotResident;
+}
+
+void FakeResidency::link(TileKind kind) const {
+    ResidentPages& pages = tables_.of(kind);
+    const Lattice& l = terrain_->lattice();
+    pages.roots.clear();
+    for (std::int64_t y = 0; y < l.root_rows; ++y)
+        for (std::int64_t x = 0; x < l.root_columns; ++x) pages.roots.push_back(entry(kind, {0, x, y}));
+    for (std::size_t slot = 0; slot < ids(kind).size(); ++slot)
+        for (int q = 0; q < 4; ++q)
+            pages.children[slot][static_cast<std::size_t>(q)] = entry(kind, child_of(ids(kind)[slot], q));
 }
 
 }  // namespace scree::test

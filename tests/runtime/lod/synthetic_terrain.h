@@ -1,10 +1,11 @@
 // SyntheticTerrain: a whole height and texture pyramid in memory, with the certified errors of common/mesh, made from
-// any function of the lattice. FakeResidency: any subset of its tiles, each in a slot of its own.
+// any function of the lattice. FakeResidency: the tables over any subset of its tiles.
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <functional>
 #include <unordered_map>
-#include <unordered_set>
 #include <vector>
 
 #include "common/dataset.h"
@@ -48,6 +49,7 @@ public:
     const std::vector<TileId>& textures() const { return texture_ids_; }
     std::int32_t texture_index(TileId id) const;
     bool has_texture(TileId id) const { return texture_index(id) >= 0; }
+    std::uint8_t texture_children(TileId id) const;  ///< child bits
     TextureTile texture(TileId id) const;
     bool present(std::int64_t i, std::int64_t j) const;
     double height_m(std::int64_t i, std::int64_t j) const { return dataset_.height_m(height_(i, j)); }
@@ -78,32 +80,53 @@ inline double uniform_real(Random& random, double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random);
 }
 
-class FakeResidency final : public Residency {
+/// Tables over any set of the terrain's tiles, each in the slot of its index in tiles() or textures(). Made anew when
+/// asked for after a change; one thread.
+class FakeResidency {
 public:
-    explicit FakeResidency(const SyntheticTerrain& terrain) : terrain_(&terrain) {}
+    explicit FakeResidency(const SyntheticTerrain& terrain);
+
     void add_all();
     void add_roots();
     /// Every tile with a chance of `percent`, roots always, whether its parent is there or not.
     void add_random(Random& random, int percent);
-    void add(TileId id) { heights_.insert(id); }
-    void add_texture(TileId id) { textures_.insert(id); }
-    void remove(TileId id) { heights_.erase(id); }
-    void make_unavailable(TileId id) {
-        heights_.erase(id);
-        unavailable_.insert(id);
-    }
-    bool holds(TileId id) const { return heights_.contains(id); }
-    bool holds_texture(TileId id) const { return textures_.contains(id); }
+    void add(TileId id) { change(TileKind::height, id, State::resident); }
+    void add_texture(TileId id) { change(TileKind::texture, id, State::resident); }
+    void remove(TileId id) { change(TileKind::height, id, State::absent); }
+    void remove_texture(TileId id) { change(TileKind::texture, id, State::absent); }
+    void make_unavailable(TileId id) { change(TileKind::height, id, State::unavailable); }
+    void make_texture_unavailable(TileId id) { change(TileKind::texture, id, State::unavailable); }
+    bool holds(TileId id) const { return state(TileKind::height, id) == State::resident; }
+    bool holds_texture(TileId id) const { return state(TileKind::texture, id) == State::resident; }
 
-    ResidentHeight height(TileId id) const override;
-    std::int32_t texture(TileId id) const override;
-    std::uint8_t texture_children(TileId id) const override;
-    bool unavailable_height(TileId id) const override { return unavailable_.contains(id); }
-    bool unavailable_texture(TileId) const override { return false; }
+    /// When a tile became resident, whether it is now or not; -infinity, there from the start, unless it is set.
+    void set_arrived(TileId id, double seconds) { set_arrived(TileKind::height, id, seconds); }
+    void set_texture_arrived(TileId id, double seconds) { set_arrived(TileKind::texture, id, seconds); }
+    void set_now(double seconds) { tables_.now_s = seconds; }
+    void set_has_textures(bool has);
+
+    /// Valid until the next change.
+    const Residency& tables() const;
+    operator const Residency&() const { return tables(); }
 
 private:
+    enum class State : std::uint8_t { absent, resident, unavailable };
+    std::int32_t index(TileKind kind, TileId id) const {
+        return kind == TileKind::height ? terrain_->index(id) : terrain_->texture_index(id);
+    }
+    const std::vector<TileId>& ids(TileKind kind) const {
+        return kind == TileKind::height ? terrain_->tiles() : terrain_->textures();
+    }
+    State state(TileKind kind, TileId id) const;
+    void change(TileKind kind, TileId id, State to);
+    void set_arrived(TileKind kind, TileId id, double seconds);
+    std::int32_t entry(TileKind kind, TileId id) const;
+    void link(TileKind kind) const;
+
     const SyntheticTerrain* terrain_;
-    std::unordered_set<TileId, TileIdHash> heights_, textures_, unavailable_;
+    std::array<std::vector<State>, 2> states_;  ///< by kind and slot
+    mutable Residency tables_;
+    mutable bool stale_ = true;
 };
 
 }  // namespace scree::test
