@@ -78,6 +78,31 @@ Result<void> read_presence(ByteReader& in, std::size_t cells, std::vector<std::u
     return {};
 }
 
+// Samples from byte planes of residuals: west + north - northwest, undone, is a running sum along each row, added to
+// the row above. Sums wrap, and cannot wrap back into range unseen: in raster order the first height out of range is
+// less than 2^31 + 2^25 away. False: there is one.
+bool undo_prediction(std::span<const std::uint8_t> plain, int planes, int pitch, std::span<std::int32_t> samples) {
+    const std::size_t count = samples.size(), row = static_cast<std::size_t>(pitch);
+    thread_local std::vector<std::uint32_t> values;
+    values.resize(count);
+    for (std::size_t k = 0; k < count; ++k) values[k] = plain[k];
+    for (std::size_t p = 1; p < static_cast<std::size_t>(planes); ++p)
+        for (std::size_t k = 0; k < count; ++k) values[k] |= std::uint32_t{plain[p * count + k]} << (8 * p);
+    for (std::size_t k = 0; k < count; ++k) values[k] = static_cast<std::uint32_t>(unzigzag(values[k]));
+    for (std::size_t start = 0; start < count; start += row) {
+        std::uint32_t sum = 0;
+        for (std::size_t k = start; k < start + row; ++k) values[k] = sum += values[k];
+        if (start == 0) continue;
+        for (std::size_t k = start; k < start + row; ++k) values[k] += values[k - row];
+    }
+    bool good = true;
+    for (std::size_t k = 0; k < count; ++k) {
+        samples[k] = static_cast<std::int32_t>(values[k]);
+        good &= values[k] + kMaxHeightUnits <= 2u * kMaxHeightUnits;
+    }
+    return good;
+}
+
 }  // namespace
 
 std::vector<std::uint8_t> encode_height_tile(const HeightTile& tile, int n, HeightCodec codec) {
@@ -127,13 +152,20 @@ std::vector<std::uint8_t> encode_height_tile(const HeightTile& tile, int n, Heig
 }
 
 Result<HeightTile> decode_height_tile(std::span<const std::uint8_t> payload, int n, int codec) {
+    HeightTile tile;
+    if (auto ok = decode_height_tile(payload, n, codec, tile); !ok) return ok.error();
+    return tile;
+}
+
+Result<void> decode_height_tile(std::span<const std::uint8_t> payload, int n, int codec, HeightTile& tile) {
     if (codec != static_cast<int>(HeightCodec::raw) && codec != static_cast<int>(HeightCodec::plane))
         return bad(fmt::format("unknown codec {}", codec));
     const int pitch = (1 << n) + 1;
     const auto count = static_cast<std::size_t>(pitch * pitch);
     const std::size_t cells = std::size_t{1} << (2 * n);
 
-    HeightTile tile;
+    tile.header = {};
+    tile.presence.clear();
     ByteReader in(payload);
     tile.header.child_mask = in.u8();
     const std::uint8_t flags = in.u8();
@@ -152,6 +184,8 @@ Result<HeightTile> decode_height_tile(std::span<const std::uint8_t> payload, int
         tile.samples.resize(count);
         ByteReader values(bytes);
         for (auto& v : tile.samples) v = values.i32();
+        for (const std::int32_t v : tile.samples)
+            if (v < -kMaxHeightUnits || v > kMaxHeightUnits) return bad(fmt::format("height {} is out of range", v));
         if ((flags & kHasPresence) != 0)
             if (auto ok = read_presence(in, cells, tile.presence); !ok) return ok.error();
         if (in.remaining() != 0) return bad(fmt::format("{} bytes too many", in.remaining()));
@@ -170,25 +204,13 @@ Result<HeightTile> decode_height_tile(std::span<const std::uint8_t> payload, int
                                                      packed.data(), packed.size());
         if (ZSTD_isError(size) != 0 || size != expected) return bad("compressed part is damaged");
         tile.samples.resize(count);
-        const auto at = [&](int i, int j) { return tile.samples[static_cast<std::size_t>(j * pitch + i)]; };
-        for (int j = 0; j < pitch; ++j)
-            for (int i = 0; i < pitch; ++i) {
-                const auto k = static_cast<std::size_t>(j * pitch + i);
-                std::uint32_t r = 0;
-                for (int plane = 0; plane < planes; ++plane)
-                    r |= std::uint32_t{plain[static_cast<std::size_t>(plane) * count + k]} << (8 * plane);
-                const std::int64_t value = std::int64_t{unzigzag(r)} + predict(at, i, j);
-                if (value < -kMaxHeightUnits || value > kMaxHeightUnits) return bad("a height is out of range");
-                tile.samples[k] = static_cast<std::int32_t>(value);
-            }
+        if (!undo_prediction(plain, planes, pitch, tile.samples)) return bad("a height is out of range");
         if (presence_bytes != 0) {
             ByteReader bits({plain.data() + count * static_cast<std::size_t>(planes), presence_bytes});
             if (auto ok = read_presence(bits, cells, tile.presence); !ok) return ok.error();
         }
     }
-    for (const std::int32_t v : tile.samples)
-        if (v < -kMaxHeightUnits || v > kMaxHeightUnits) return bad(fmt::format("height {} is out of range", v));
-    return tile;
+    return {};
 }
 
 }  // namespace scree

@@ -21,5 +21,8 @@ std::vector<std::uint8_t> encode_height_tile(const HeightTile& tile, int tile_ce
 /// Errors: ErrorCode::store for any payload that is not exactly one well-formed tile: truncated, too long, counts or
 /// heights out of range, non-finite errors, unknown codec. Nothing is allocated from an unchecked length.
 Result<HeightTile> decode_height_tile(std::span<const std::uint8_t> payload, int tile_cells_log2, int codec);
+/// The same into a tile whose buffers are reused; its content means nothing after an error.
+Result<void> decode_height_tile(std::span<const std::uint8_t> payload, int tile_cells_log2, int codec,
+                                HeightTile& tile);
 
 }  // namespace scree

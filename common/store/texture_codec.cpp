@@ -44,16 +44,21 @@ std::vector<std::uint8_t> encode_texture_tile(const TextureTile& tile, int size_
 }
 
 Result<TextureTile> decode_texture_tile(std::span<const std::uint8_t> payload, int size_log2, int codec) {
+    TextureTile tile;
+    if (auto ok = decode_texture_tile(payload, size_log2, codec, tile); !ok) return ok.error();
+    return tile;
+}
+
+Result<void> decode_texture_tile(std::span<const std::uint8_t> payload, int size_log2, int codec, TextureTile& tile) {
     const std::size_t size = bc1_chain_bytes(size_log2);
     ByteReader in(payload);
-    TextureTile tile;
     tile.child_mask = in.u8();
     if (!in.ok() || tile.child_mask > 15) return bad(fmt::format("child bits {} out of range", tile.child_mask));
     const auto rest = in.bytes(in.remaining());
     if (codec == static_cast<int>(TextureCodec::raw)) {
         if (rest.size() != size) return bad(fmt::format("{} bytes instead of {}", rest.size(), size));
         tile.blocks.assign(rest.begin(), rest.end());
-        return tile;
+        return {};
     }
     if (codec != static_cast<int>(TextureCodec::split)) return bad(fmt::format("unknown codec {}", codec));
     if (ZSTD_getFrameContentSize(rest.data(), rest.size()) != size ||
@@ -64,14 +69,24 @@ Result<TextureTile> decode_texture_tile(std::span<const std::uint8_t> payload, i
     plain.resize(size);
     const std::size_t got = ZSTD_decompressDCtx(context.get(), plain.data(), plain.size(), rest.data(), rest.size());
     if (ZSTD_isError(got) != 0 || got != size) return bad("compressed part is damaged");
+    // Endpoint planes and selectors as the encoder set them apart.
     const std::size_t blocks = size / 8;
     tile.blocks.resize(size);
+    const std::uint8_t *p0 = plain.data(), *p1 = p0 + blocks, *p2 = p1 + blocks, *p3 = p2 + blocks;
+    const std::uint8_t* selectors = p3 + blocks;
+    std::uint8_t* out = tile.blocks.data();
     for (std::size_t b = 0; b < blocks; ++b) {
-        std::uint8_t* block = tile.blocks.data() + 8 * b;
-        for (std::size_t k = 0; k < 4; ++k) block[k] = plain[k * blocks + b];
-        std::memcpy(block + 4, plain.data() + 4 * blocks + 4 * b, 4);
+        const std::uint8_t block[8] = {p0[b],
+                                       p1[b],
+                                       p2[b],
+                                       p3[b],
+                                       selectors[4 * b],
+                                       selectors[4 * b + 1],
+                                       selectors[4 * b + 2],
+                                       selectors[4 * b + 3]};
+        std::memcpy(out + 8 * b, block, 8);
     }
-    return tile;
+    return {};
 }
 
 }  // namespace scree

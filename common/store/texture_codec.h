@@ -19,5 +19,8 @@ std::vector<std::uint8_t> encode_texture_tile(const TextureTile& tile, int textu
 
 /// Errors: ErrorCode::store for any payload that is not exactly one well-formed tile.
 Result<TextureTile> decode_texture_tile(std::span<const std::uint8_t> payload, int texture_size_log2, int codec);
+/// The same into a tile whose buffer is reused; its content means nothing after an error.
+Result<void> decode_texture_tile(std::span<const std::uint8_t> payload, int texture_size_log2, int codec,
+                                 TextureTile& tile);
 
 }  // namespace scree

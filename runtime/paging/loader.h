@@ -1,11 +1,12 @@
-// Loader: threads that read and decode tiles in order of urgency. Bounded: at most `staging_slots` tiles of each kind
-// exist between disk and GPU. All functions are called by the frame-loop thread; the threads are inside.
+// Loader: threads that read and decode tiles in order of urgency, prefetched ones last. It keeps as many staged tiles
+// as its caller lets be under way at once, and reuses them. All functions are called by the frame-loop thread and hold
+// no lock that a thread keeps while it reads; the threads are inside.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
-#include <functional>
 #include <memory>
-#include <span>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -19,38 +20,68 @@ struct LoadJob {
     TileId id;
     std::int32_t slot = -1;
     double priority = 0;
+    bool prefetch = false;
+    std::int64_t order = 0;                             ///< among jobs of one priority, the smallest goes first
+    std::chrono::steady_clock::time_point queued_at{};  ///< set by the loader
 };
 
 struct LoadedTile {
     LoadJob job;
-    std::string error;  ///< empty: loaded
+    std::string error;     ///< empty: loaded
+    bool missing = false;  ///< there is no such tile: an error too
     HeightTileHeader header;
     std::vector<SlotVertex> vertices;  ///< height tiles
     std::vector<std::uint8_t> blocks;  ///< texture tiles, mip chain coarsest first
     std::int64_t bytes_read = 0;       ///< payload as stored
 };
 
+/// Of tiles that were staged, damaged ones included.
+struct LoaderCounters {
+    std::int64_t tiles = 0;
+    double cpu_seconds = 0;      ///< of the loader's threads, from a job taken up to its tile staged
+    double latency_seconds = 0;  ///< from a job queued to its tile staged, summed
+};
+
 class Loader {
 public:
     /// Errors: those of TileStore::open_reader. `latency_ms` delays every read (to test slow disks).
     static Result<std::unique_ptr<Loader>> start(const TileStore& store, int threads, int latency_ms);
+    /// Waits for the reads in progress, not for their delays.
     ~Loader();
     Loader(const Loader&) = delete;
     Loader& operator=(const Loader&) = delete;
 
-    /// Changes the list of jobs not begun: `edit` may remove, add and re-prioritise while no thread can begin one.
-    void edit_queue(const std::function<void(std::vector<LoadJob>&)>& edit);
-    /// Takes one finished tile; false when none is ready. `wait`: blocks until one is, if anything is under way.
-    bool take(LoadedTile& out, bool wait);
-    /// Gives a taken tile's buffers back for reuse.
-    void recycle(LoadedTile&& tile);
+    /// The jobs not begun, while it lives: they may be removed, added and changed, and no thread can begin one.
+    class QueueEdit {
+    public:
+        explicit QueueEdit(Loader& loader);
+        ~QueueEdit();
+        QueueEdit(const QueueEdit&) = delete;
+        QueueEdit& operator=(const QueueEdit&) = delete;
+        std::vector<LoadJob>& jobs();
+        /// A job begun as a prefetch is one no longer: its tile, if it waits to be taken, is taken before prefetches.
+        void promote(TileKind kind, std::int32_t slot);
+
+    private:
+        Loader& loader_;
+        std::unique_lock<std::mutex> lock_;
+    };
+
+    /// A finished tile, prefetches last; null when none is ready. `wait`: blocks until one is, if anything is under
+    /// way. Give it back to recycle().
+    LoadedTile* take(bool wait);
+    void recycle(LoadedTile* tile);
     /// Jobs queued, being read or waiting to be taken.
     std::int64_t under_way() const;
+    LoaderCounters counters(TileKind kind) const;
 
 private:
     struct Impl;
     explicit Loader(std::unique_ptr<Impl> impl);
     std::unique_ptr<Impl> impl_;
 };
+
+/// Bytes that a thread of the loader keeps besides the tiles that it stages: reader, payload, codec and stack.
+std::int64_t loader_thread_bytes(const Dataset& dataset);
 
 }  // namespace scree

@@ -8,35 +8,45 @@
 #include "common/height_tile.h"
 #include "common/mesh/vertex_slot.h"
 #include "common/texture_tile.h"
+#include "runtime/paging/loader.h"
+#include "runtime/paging/tile_cache.h"
 
 namespace scree {
 namespace {
 
-constexpr std::int64_t kStagingSlots = 96;       // of each kind: what two threads decode in a frame of 30 ms
-constexpr std::int64_t kBookkeepingBytes = 160;  // hash map entry, list links, ids
-constexpr double kHeightShare = 0.3;             // 14.6 KB against 43.7 KB: a page for each texture and a quarter more
+constexpr std::int64_t kStagingSlots = 96;  // of each kind: what two threads decode in a frame of 30 ms
+constexpr double kHeightShare = 0.2;        // 9.0 KB against 44.0 KB: a page for each texture and a quarter more
+// A staged tile's names and header, the job that asked for it, and what malloc keeps of its buffer.
+constexpr std::int64_t kStagedBytes = 640;
+// What evictions are remembered by, lists of requests, code and tables of the libraries that reading touches first.
+constexpr std::int64_t kFixedBytes = 512 * 1024;
 
 constexpr double kMebibyte = 1024.0 * 1024;
 
 }  // namespace
 
 std::int64_t height_slot_cost(const Dataset& d) {
-    return static_cast<std::int64_t>(slot_bytes(d.lattice.tile_cells_log2)) +
-           static_cast<std::int64_t>(sizeof(HeightTileHeader)) + kBookkeepingBytes;
+    return static_cast<std::int64_t>(slot_bytes(d.lattice.tile_cells_log2)) + TileCache::bookkeeping_bytes();
 }
 std::int64_t texture_slot_cost(const Dataset& d) {
-    return static_cast<std::int64_t>(bc1_chain_bytes(d.texture_size_log2)) + kBookkeepingBytes;
+    return static_cast<std::int64_t>(bc1_chain_bytes(d.texture_size_log2)) + TileCache::bookkeeping_bytes();
 }
 
-Result<MemoryPlan> plan_memory(const Dataset& d, std::int64_t budget_bytes) {
+std::int64_t fixed_cost(const Dataset& d, int loader_threads) {
+    return kFixedBytes + std::max(loader_threads, 1) * loader_thread_bytes(d);
+}
+
+Result<MemoryPlan> plan_memory(const Dataset& d, std::int64_t budget_bytes, int loader_threads) {
     const std::int64_t height = height_slot_cost(d), texture = texture_slot_cost(d);
+    const std::int64_t fixed = fixed_cost(d, loader_threads);
     const std::int64_t roots = d.lattice.root_rows * d.lattice.root_columns;
+    const std::int64_t staged = height + texture + 2 * kStagedBytes;
     MemoryPlan plan;
-    plan.staging_slots = std::clamp<std::int64_t>(budget_bytes / 16 / (height + texture), 2, kStagingSlots);
-    const std::int64_t staging = plan.staging_slots * (height + texture);
+    plan.staging_slots = std::clamp<std::int64_t>((budget_bytes - fixed) / 16 / staged, 2, kStagingSlots);
+    const std::int64_t staging = plan.staging_slots * staged;
     const std::int64_t pinned = roots * (height + texture);
     // Besides the roots a split needs four tiles of each kind.
-    const std::int64_t needed = std::max(8 * pinned, staging + pinned + 4 * (height + texture));
+    const std::int64_t needed = fixed + std::max(8 * pinned, staging + pinned + 4 * (height + texture));
     if (budget_bytes < needed)
         return Error{
             ErrorCode::usage,
@@ -44,7 +54,7 @@ Result<MemoryPlan> plan_memory(const Dataset& d, std::int64_t budget_bytes) {
                         "root{} may take an eighth)",
                         static_cast<double>(budget_bytes) / kMebibyte,
                         std::ceil(static_cast<double>(needed) / kMebibyte * 10) / 10, roots, roots == 1 ? "" : "s")};
-    const std::int64_t free = budget_bytes - staging;
+    const std::int64_t free = budget_bytes - fixed - staging;
     // Heights take their share, but leave textures room to split a root.
     const std::int64_t share = std::min(static_cast<std::int64_t>(kHeightShare * static_cast<double>(free)),
                                         free - std::min(roots + 4, d.texture_tiles) * texture);
@@ -52,7 +62,7 @@ Result<MemoryPlan> plan_memory(const Dataset& d, std::int64_t budget_bytes) {
     plan.texture_slots = std::clamp<std::int64_t>((free - plan.height_slots * height) / texture, 1, d.texture_tiles);
     // What a small texture pyramid leaves over goes to heights.
     plan.height_slots = std::min((free - plan.texture_slots * texture) / height, d.height_tiles);
-    plan.resident_bytes = staging + plan.height_slots * height + plan.texture_slots * texture;
+    plan.resident_bytes = fixed + staging + plan.height_slots * height + plan.texture_slots * texture;
     return plan;
 }
 

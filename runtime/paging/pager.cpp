@@ -4,161 +4,231 @@
 
 #include <algorithm>
 #include <cassert>
+#include <limits>
 
 #include "common/mesh/vertex_slot.h"
 
 namespace scree {
+namespace {
+
+constexpr double kFromTheStart = -std::numeric_limits<double>::infinity();
+
+const char* name_of(TileKind kind) { return kind == TileKind::height ? "height" : "texture"; }
+
+std::string with_tile(const LoadedTile& tile) {
+    const TileId id = tile.job.id;
+    return fmt::format("{} tile {}/{}/{}: {}", name_of(tile.job.kind), id.level, id.x, id.y, tile.error);
+}
+
+}  // namespace
 
 Pager::Pager(const TileStore& store, const PagerOptions& options, TileSink& sink)
     : store_(store),
       options_(options),
       sink_(sink),
-      heights_(options.memory.height_slots),
-      textures_(options.memory.texture_slots) {}
+      heights_(options.memory.height_slots, store.dataset().lattice, residency_.heights),
+      textures_(options.textures ? options.memory.texture_slots : 0, store.dataset().lattice, residency_.textures) {
+    residency_.has_textures = options.textures;
+}
 
 Result<std::unique_ptr<Pager>> Pager::create(const TileStore& store, const PagerOptions& options, TileSink& sink) {
     std::unique_ptr<Pager> pager(new Pager(store, options, sink));
-    if (auto ok = pager->load_roots(); !ok) return ok.error();
     auto loader = Loader::start(store, options.loader_threads, options.latency_ms);
     if (!loader) return loader.error();
     pager->loader_ = std::move(*loader);
+    if (auto ok = pager->load_roots(); !ok) return ok.error();
     return pager;
 }
 
 Result<void> Pager::load_roots() {
-    const Dataset& d = store_.dataset();
-    auto reader = store_.open_reader();
-    if (!reader) return reader.error();
-    std::vector<SlotVertex> vertices(slot_vertex_count(d.lattice.tile_cells_log2));
-    TileRow row;
-    for (std::int64_t y = 0; y < d.lattice.root_rows; ++y)
-        for (std::int64_t x = 0; x < d.lattice.root_columns; ++x) {
-            const TileId id{0, x, y};
-            auto found = (*reader)->read(TileKind::height, id, row);
-            if (!found) return found.error();
-            if (!*found) continue;  // no heights there at all
-            auto tile = read_height_tile(**reader, d, id);
-            if (!tile) return tile.error();
-            fill_vertex_slot(tile->samples, d.lattice.tile_cells_log2, vertices);
-            const auto slot = heights_.reserve(id, frame_);
-            if (!slot) return Error{ErrorCode::usage, "more roots than height slots"};
-            heights_.complete(id, &tile->header);
-            heights_.pin(id);
-            sink_.put_height(*slot, vertices);
-            if (!options_.textures) continue;
-            auto texture = read_texture_tile(**reader, d, id);
-            if (!texture) return texture.error();
-            const auto texture_slot = textures_.reserve(id, frame_);
-            if (!texture_slot) return Error{ErrorCode::usage, "more roots than texture slots"};
-            HeightTileHeader children;
-            children.child_mask = texture->child_mask;
-            textures_.complete(id, &children);
-            textures_.pin(id);
-            sink_.put_texture(*texture_slot, texture->blocks);
-        }
+    const Lattice& l = store_.dataset().lattice;
+    std::vector<TileId> ids;
+    for (std::int64_t y = 0; y < l.root_rows; ++y)
+        for (std::int64_t x = 0; x < l.root_columns; ++x) ids.push_back({0, x, y});
+    auto stored = load_roots(TileKind::height, ids);
+    if (!stored) return stored.error();
+    if (!options_.textures) return {};
+    auto textured = load_roots(TileKind::texture, *stored);
+    if (!textured) return textured.error();
     return {};
 }
 
-ResidentHeight Pager::height(TileId id) const {
-    const TileCache::Entry* entry = heights_.find(id);
-    if (entry == nullptr || entry->state != TileCache::State::resident) return {};
-    return {&entry->header, entry->slot};
-}
-
-std::int32_t Pager::texture(TileId id) const {
-    const TileCache::Entry* entry = textures_.find(id);
-    return entry != nullptr && entry->state == TileCache::State::resident ? entry->slot : -1;
-}
-
-std::uint8_t Pager::texture_children(TileId id) const {
-    const TileCache::Entry* entry = textures_.find(id);
-    return entry != nullptr && entry->state == TileCache::State::resident ? entry->header.child_mask : std::uint8_t{0};
-}
-
-bool Pager::unavailable_height(TileId id) const {
-    const TileCache::Entry* entry = heights_.find(id);
-    return entry != nullptr && entry->state == TileCache::State::unavailable;
-}
-
-bool Pager::unavailable_texture(TileId id) const {
-    const TileCache::Entry* entry = textures_.find(id);
-    return !options_.textures || (entry != nullptr && entry->state == TileCache::State::unavailable);
-}
-
-void Pager::accept(LoadedTile&& tile) {
-    const LoadJob job = tile.job;
-    --loading_[static_cast<int>(job.kind)];
-    counters_.bytes_read += tile.bytes_read;
-    if (!tile.error.empty()) {
-        cache(job.kind).fail(job.id);
-        ++counters_.damaged_tiles;
-        if (on_damage)
-            on_damage(fmt::format("{} tile {}/{}/{}: {}; its parent stands in",
-                                  job.kind == TileKind::height ? "height" : "texture", job.id.level, job.id.x, job.id.y,
-                                  tile.error));
-    } else if (job.kind == TileKind::height) {
-        sink_.put_height(job.slot, tile.vertices);
-        heights_.complete(job.id, &tile.header);
-        ++counters_.tiles_paged_in;
-    } else {
-        sink_.put_texture(job.slot, tile.blocks);
-        textures_.complete(job.id, &tile.header);
-        ++counters_.tiles_paged_in;
+// Returns those that are stored: there may be no heights under a root, but where there are heights there is a texture.
+Result<std::vector<TileId>> Pager::load_roots(TileKind kind, std::span<const TileId> ids) {
+    TileCache& tiles = cache(kind);
+    std::vector<TileId> stored;
+    std::size_t queued = 0, taken = 0;
+    while (taken < ids.size()) {
+        for (; queued < ids.size() && static_cast<std::int64_t>(queued - taken) < options_.memory.staging_slots;
+             ++queued) {
+            const auto slot = tiles.reserve(ids[queued], 0);
+            if (!slot) return Error{ErrorCode::usage, fmt::format("more roots than {} slots", name_of(kind))};
+            Loader::QueueEdit queue(*loader_);
+            queue.jobs().push_back({kind, ids[queued], *slot, 0, false, order_++, {}});
+        }
+        LoadedTile* tile = loader_->take(true);
+        ++taken;
+        if (tile->missing && kind == TileKind::height) {
+            tiles.cancel(tile->job.slot);
+        } else if (!tile->error.empty()) {
+            return Error{ErrorCode::store, with_tile(*tile)};
+        } else {
+            put(*tile, kFromTheStart);
+            tiles.pin(tile->job.slot);
+            stored.push_back(tile->job.id);
+        }
+        loader_->recycle(tile);
     }
-    loader_->recycle(std::move(tile));
+    return stored;
+}
+
+void Pager::put(const LoadedTile& tile, double arrived_s) {
+    if (tile.job.kind == TileKind::height)
+        sink_.put_height(tile.job.slot, tile.vertices);
+    else
+        sink_.put_texture(tile.job.slot, tile.blocks);
+    cache(tile.job.kind).complete(tile.job.slot, tile.header, arrived_s);
+}
+
+void Pager::report_damage(const LoadedTile& tile) {
+    ++counters_.damaged_tiles;
+    if (on_damage) on_damage(with_tile(tile) + "; its parent stands in");
+}
+
+void Pager::accept(LoadedTile* tile) {
+    const LoadJob& job = tile->job;
+    TileCache& tiles = cache(job.kind);
+    const bool prefetch = tiles.prefetch(job.slot);
+    --loading(job.kind).of(prefetch);
+    counters_.bytes_read += tile->bytes_read;
+    if (tile->error.empty()) {
+        put(*tile, residency_.now_s);
+        ++counters_.tiles_paged_in;
+        if (prefetch) ++counters_.prefetched;
+    } else {
+        tiles.fail(job.slot);
+        report_damage(*tile);
+    }
+    loader_->recycle(tile);
 }
 
 int Pager::take_arrivals(std::int64_t upload_bytes, bool wait) {
     int taken = 0;
-    LoadedTile tile;
-    while (upload_bytes > 0 && loader_->take(tile, wait && taken == 0)) {
+    while (upload_bytes > 0) {
+        LoadedTile* tile = loader_->take(wait && taken == 0);
+        if (tile == nullptr) break;
         upload_bytes -= static_cast<std::int64_t>(
-            tile.job.kind == TileKind::height ? tile.vertices.size() * sizeof(SlotVertex) : tile.blocks.size());
-        accept(std::move(tile));
+            tile->job.kind == TileKind::height ? tile->vertices.size() * sizeof(SlotVertex) : tile->blocks.size());
+        accept(tile);
         ++taken;
     }
+    assert(adds_up());
     return taken;
 }
 
 void Pager::request(const Wishes& wishes) {
-    ++frame_;
+    heights_.begin_frame();
+    textures_.begin_frame();
     heights_.touch(wishes.standing_heights);
     textures_.touch(wishes.standing_textures);
-    heights_.touch_planned(wishes.planned_heights, frame_);
-    textures_.touch_planned(wishes.planned_textures, frame_);
-
-    const std::int64_t evicted_before = heights_.evictions() + textures_.evictions();
-    loader_->edit_queue([&](std::vector<LoadJob>& queue) { update_queue(wishes.requests, queue); });
-    counters_.tiles_paged_out += heights_.evictions() + textures_.evictions() - evicted_before;
+    heights_.touch_planned(wishes.planned_heights);
+    textures_.touch_planned(wishes.planned_textures);
+    note_wishes(wishes.requests);
+    if (!missing_.empty() || heights_.loading() + textures_.loading() > 0) {
+        Loader::QueueEdit queue(*loader_);
+        update_queue(queue);
+    }
+    counters_.tiles_paged_out = heights_.evictions() + textures_.evictions();
+    assert(adds_up());
 }
 
-void Pager::update_queue(std::span<const TileRequest> requests, std::vector<LoadJob>& queue) {
-    // Jobs not begun keep their slots while they are wished for; the others are forgotten.
-    std::erase_if(queue, [&](LoadJob& job) {
-        const auto wish = std::find_if(requests.begin(), requests.end(),
-                                       [&](const TileRequest& r) { return r.kind == job.kind && r.id == job.id; });
-        if (wish != requests.end()) {
-            job.priority = wish->priority;
-            return false;
+// Tells what is on its way already from what is missing.
+void Pager::note_wishes(std::span<const TileRequest> requests) {
+    missing_.clear();
+    promoted_.clear();
+    for (const TileRequest& wish : requests) {
+        if (wish.kind == TileKind::texture && !options_.textures) continue;
+        if (!store_.dataset().lattice.contains(wish.id)) continue;
+        TileCache& tiles = cache(wish.kind);
+        const std::int32_t slot = tiles.find(wish.id);
+        if (slot == kNotResident) missing_.push_back(&wish);
+        if (slot < 0 || tiles.state(slot) != TileCache::State::loading) continue;
+        if (tiles.prefetch(slot) && !wish.prefetch) {
+            tiles.promote(slot);
+            --loading(wish.kind).prefetched;
+            ++loading(wish.kind).requested;
+            promoted_.emplace_back(wish.kind, slot);
         }
-        cache(job.kind).cancel(job.id);
-        --loading_[static_cast<int>(job.kind)];
+        // What was asked for in earnest and is now wanted soon makes room for others, unless it is being read.
+        if (tiles.prefetch(slot) == wish.prefetch)
+            tiles.wish(slot, wish.priority);
+        else
+            missing_.push_back(&wish);
+    }
+}
+
+void Pager::update_queue(Loader::QueueEdit& queue) {
+    for (const auto& [kind, slot] : promoted_) queue.promote(kind, slot);
+    std::vector<LoadJob>& jobs = queue.jobs();
+    // Jobs not begun keep their slots while they are wished for; the others are forgotten.
+    std::erase_if(jobs, [&](LoadJob& job) {
+        TileCache& tiles = cache(job.kind);
+        job.prefetch = tiles.prefetch(job.slot);
+        job.priority = tiles.need(job.slot);
+        if (tiles.wished(job.slot)) return false;
+        --loading(job.kind).of(job.prefetch);
+        tiles.cancel(job.slot);
         return true;
     });
-    bool full[2] = {false, false};
-    for (const TileRequest& wish : requests) {
-        const int kind = static_cast<int>(wish.kind);
-        if (full[kind] || loading_[kind] >= options_.memory.staging_slots) continue;
-        TileCache& tiles = cache(wish.kind);
-        if (tiles.find(wish.id) != nullptr) continue;
-        const auto slot = tiles.reserve(wish.id, frame_);
-        if (!slot) {
-            full[kind] = true;
-            continue;
-        }
-        ++loading_[kind];
-        queue.push_back({wish.kind, wish.id, *slot, wish.priority});
+    full_ = no_idle_ = {};
+    for (const bool prefetch : {false, true})
+        for (const TileRequest* wish : missing_)
+            if (wish->prefetch == prefetch && may_begin(*wish)) begin(*wish, jobs);
+}
+
+// Prefetches have places of their own among the staged tiles, so that they never keep another request out of one.
+bool Pager::may_begin(const TileRequest& wish) {
+    const auto kind = static_cast<std::size_t>(wish.kind);
+    const Loading& under_way = loading_[kind];
+    const std::int64_t all = options_.memory.staging_slots, ahead = prefetch_places();
+    if (wish.prefetch) return !no_idle_[kind] && under_way.prefetched < ahead && under_way.total() < all;
+    if (full_[kind] && under_way.requested < all - ahead) ++counters_.refused;
+    return !full_[kind] && under_way.requested < all - ahead;
+}
+
+void Pager::begin(const TileRequest& wish, std::vector<LoadJob>& jobs) {
+    TileCache& tiles = cache(wish.kind);
+    if (tiles.find(wish.id) != kNotResident) return;  // listed twice
+    const auto claim = wish.prefetch ? TileCache::Claim::idle : TileCache::Claim::any;
+    auto slot = tiles.reserve(wish.id, wish.priority, claim);
+    if (!slot && !wish.prefetch && cancel_a_prefetch(wish.kind, jobs)) slot = tiles.reserve(wish.id, wish.priority);
+    const auto kind = static_cast<std::size_t>(wish.kind);
+    if (!slot) {
+        if (wish.prefetch)
+            no_idle_[kind] = true;
+        else
+            ++counters_.refused;
+        full_[kind] = full_[kind] || tiles.exhausted();
+        return;
     }
+    ++loading(wish.kind).of(wish.prefetch);
+    jobs.push_back({wish.kind, wish.id, *slot, wish.priority, wish.prefetch, order_++, {}});
+}
+
+bool Pager::cancel_a_prefetch(TileKind kind, std::vector<LoadJob>& jobs) {
+    const auto job =
+        std::find_if(jobs.begin(), jobs.end(), [&](const LoadJob& j) { return j.kind == kind && j.prefetch; });
+    if (job == jobs.end()) return false;
+    cache(kind).cancel(job->slot);
+    --loading(kind).prefetched;
+    jobs.erase(job);
+    return true;
+}
+
+bool Pager::adds_up() const {
+    return loading_[0].total() == heights_.loading() && loading_[1].total() == textures_.loading() &&
+           heights_.in_use() == heights_.resident() + heights_.loading() &&
+           textures_.in_use() == textures_.resident() + textures_.loading();
 }
 
 }  // namespace scree

@@ -1,14 +1,17 @@
-// Pager: tiles in and out of fixed slots. It answers selection's questions (Residency) and carries out its wishes.
-// Loading a tile goes   absent -> reserved (slot taken, job queued) -> being read -> staged -> resident -> evicted,
-// with the side ways: queued -> cancelled, read -> unavailable (damaged; said once, its parent stands in).
-// Frame-loop thread only; the loader's threads are inside.
+// Pager: tiles in and out of fixed slots. It keeps the tables that selection reads (Residency) and carries out its
+// wishes. Loading a tile goes   absent -> reserved (slot taken, job queued) -> being read -> staged -> resident ->
+// evicted, with the side ways: queued -> cancelled, read -> unavailable (damaged; said once, its parent stands in).
+// What a frame costs goes by what it wishes for and what arrives, not by slots or by the store; a frame that asks for
+// nothing new allocates nothing. Frame-loop thread only; the loader's threads are inside, and no call waits for them.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/store/tile_store.h"
@@ -33,52 +36,78 @@ struct PagerCounters {
     std::int64_t tiles_paged_out = 0;
     std::int64_t bytes_read = 0;
     std::int64_t damaged_tiles = 0;
+    std::int64_t refused = 0;     ///< requests for which no slot could be had, anew in each frame that makes them
+    std::int64_t prefetched = 0;  ///< of tiles_paged_in, those that came before they were asked for in earnest
 };
 
-class Pager final : public Residency {
+class Pager final {
 public:
     /// Loads and pins the roots. Errors: those of the store; a damaged root cannot be stood in for.
     static Result<std::unique_ptr<Pager>> create(const TileStore& store, const PagerOptions& options, TileSink& sink);
 
-    ResidentHeight height(TileId id) const override;
-    std::int32_t texture(TileId id) const override;
-    std::uint8_t texture_children(TileId id) const override;
-    bool unavailable_height(TileId id) const override;
-    bool unavailable_texture(TileId id) const override;
+    const Residency& residency() const { return residency_; }
+    /// What arrives from now on has come at `now_s`. Seconds from any start; never goes back.
+    void advance_clock(double now_s) { residency_.now_s = now_s; }
 
-    /// Hands arrived tiles to the sink, up to `upload_bytes`. `wait`: if nothing has arrived, blocks until something
-    /// does. Returns the tiles taken.
+    /// Hands arrived tiles to the sink, up to `upload_bytes`, prefetched ones last. `wait`: if nothing has arrived,
+    /// blocks until something does. Returns the tiles taken.
     int take_arrivals(std::int64_t upload_bytes, bool wait);
 
     struct Wishes {
-        std::span<const TileId> planned_heights, planned_textures;    ///< never evicted
-        std::span<const TileId> standing_heights, standing_textures;  ///< evicted last
-        std::span<const TileRequest> requests;                        ///< most urgent first
+        /// Slots of resident tiles, parents before children. Planned ones are not evicted in this frame, standing ones
+        /// after all others.
+        std::span<const std::int32_t> planned_heights, planned_textures;
+        std::span<const std::int32_t> standing_heights, standing_textures;
+        std::span<const TileRequest> requests;  ///< most urgent first; what is resident or on its way may be among them
     };
-    /// Once a frame, after selection. Requests not begun and no longer wished for are cancelled.
+    /// Once a frame, after selection. Requests not begun and no longer wished for are cancelled. A request is begun
+    /// only if its tile can be kept: it waits while there is no slot for it. Prefetches take a free slot or one that
+    /// nobody touched for TileCache::kIdleFrames, and give it back to any other request until they are being read.
     void request(const Wishes& wishes);
 
     bool idle() const { return loader_->under_way() == 0; }
     const PagerCounters& counters() const { return counters_; }
+    LoaderCounters loader_counters(TileKind kind) const { return loader_->counters(kind); }
     std::int64_t height_slots() const { return heights_.capacity(); }
     std::int64_t texture_slots() const { return textures_.capacity(); }
     /// Called once for each damaged tile.
     std::function<void(const std::string&)> on_damage;
 
 private:
+    /// Slots reserved but not resident, of one kind.
+    struct Loading {
+        std::int64_t requested = 0, prefetched = 0;
+        std::int64_t& of(bool prefetch) { return prefetch ? prefetched : requested; }
+        std::int64_t total() const { return requested + prefetched; }
+    };
     Pager(const TileStore& store, const PagerOptions& options, TileSink& sink);
     Result<void> load_roots();
+    Result<std::vector<TileId>> load_roots(TileKind kind, std::span<const TileId> ids);
     TileCache& cache(TileKind kind) { return kind == TileKind::height ? heights_ : textures_; }
-    void accept(LoadedTile&& tile);
-    void update_queue(std::span<const TileRequest> requests, std::vector<LoadJob>& queue);
+    Loading& loading(TileKind kind) { return loading_[static_cast<std::size_t>(kind)]; }
+    void put(const LoadedTile& tile, double arrived_s);
+    void accept(LoadedTile* tile);
+    void report_damage(const LoadedTile& tile);
+    void note_wishes(std::span<const TileRequest> requests);
+    void update_queue(Loader::QueueEdit& queue);
+    bool may_begin(const TileRequest& wish);
+    void begin(const TileRequest& wish, std::vector<LoadJob>& jobs);
+    bool cancel_a_prefetch(TileKind kind, std::vector<LoadJob>& jobs);
+    std::int64_t prefetch_places() const { return options_.memory.staging_slots / 8; }
+    bool adds_up() const;
 
     const TileStore& store_;
     PagerOptions options_;
     TileSink& sink_;
+    Residency residency_;
     TileCache heights_, textures_;
     std::unique_ptr<Loader> loader_;
-    std::int64_t loading_[2] = {0, 0};  ///< slots reserved but not resident, by kind
-    std::uint64_t frame_ = 1;
+    std::array<Loading, 2> loading_;                           ///< by kind
+    std::array<bool, 2> full_{};                               ///< no slot is left in this frame for a request, by kind
+    std::array<bool, 2> no_idle_{};                            ///< nor for a prefetch
+    std::vector<const TileRequest*> missing_;                  ///< of this frame's requests; a buffer
+    std::vector<std::pair<TileKind, std::int32_t>> promoted_;  ///< likewise
+    std::int64_t order_ = 0;
     PagerCounters counters_;
 };
 
