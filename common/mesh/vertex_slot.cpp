@@ -1,60 +1,50 @@
 #include "common/mesh/vertex_slot.h"
 
-#include <algorithm>
 #include <cassert>
-
-#include "common/mesh/drawn_surface.h"
 
 namespace scree {
 namespace {
 
-// A vertex first appears at geomip level k = the number of factors two its coordinates share; it is drawn up to level k
-// and lies on the mid-point of an edge or diagonal of level k + 1.
-int birth_level(int i, int j, int deepest) {
-    int level = 0;
-    while (level < deepest && ((i | j) & 1) == 0) {
-        i >>= 1;
-        j >>= 1;
-        ++level;
-    }
-    return level;
+float mean(std::int32_t a, std::int32_t b) { return 0.5f * static_cast<float>(a + b); }  // |a + b| < 2^24: exact
+
+// A row that a coarser level draws too: its vertices of odd multiples of the stride lie on edges along x.
+void fill_edges_along_x(const std::int32_t* row, int cells, int stride, SlotVertex* out) {
+    for (int i = stride; i < cells; i += 2 * stride) out[i].next_n = mean(row[i - stride], row[i + stride]);
+}
+
+// A row between two that a coarser level draws, `north` and `south`: vertices on edges along y and, between those, the
+// middles of the coarser level's cells. The first cell of the row is split from its north-west corner iff `even`.
+void fill_row_between(const std::int32_t* north, const std::int32_t* south, int cells, int stride, bool even,
+                      SlotVertex* out) {
+    for (int i = 0; i <= cells; i += 2 * stride) out[i].next_n = mean(north[i], south[i]);
+    for (int i = stride; i < cells; i += 2 * stride, even = !even)
+        out[i].next_n = even ? mean(north[i - stride], south[i + stride]) : mean(north[i + stride], south[i - stride]);
 }
 
 }  // namespace
 
 void fill_vertex_slot(std::span<const std::int32_t> samples, int tile_cells_log2, std::span<SlotVertex> out) {
-    const int n = tile_cells_log2;
-    const int m = 1 << n;
-    const int pitch = m + 1;
-    assert(samples.size() == static_cast<std::size_t>(pitch * pitch) && out.size() == slot_vertex_count(n));
-    const auto on_level = [&](int i, int j, int level) {
-        level = std::min(level, n - 1);
-        return static_cast<float>(drawn_height(samples, n, {level, 0}, i, j, 1).quanta());
-    };
-    for (int j = 0; j <= m; ++j) {
-        for (int i = 0; i <= m; ++i) {
-            const int birth = birth_level(i, j, n - 1);
-            SlotVertex& v = out[static_cast<std::size_t>(j * pitch + i)];
-            v.height_n = static_cast<float>(samples[static_cast<std::size_t>(j * pitch + i)]);
-            v.next_n = on_level(i, j, birth + 1);
-            v.second_next_n = on_level(i, j, birth + 2);
+    const int cells = 1 << tile_cells_log2;
+    const std::ptrdiff_t pitch = cells + 1;
+    assert(samples.size() == slot_vertex_count(tile_cells_log2) && out.size() == samples.size());
+    for (std::size_t k = 0; k < out.size(); ++k) {
+        const float own = static_cast<float>(samples[k]);
+        out[k] = {own, own};
+    }
+    // The vertices born at a stride are those of its grid that twice the stride leaves out; every level writes its own.
+    for (int stride = 1; stride < cells; stride *= 2) {
+        for (int j = 0; j <= cells; j += 2 * stride)
+            fill_edges_along_x(&samples[static_cast<std::size_t>(j * pitch)], cells, stride,
+                               &out[static_cast<std::size_t>(j * pitch)]);
+        for (int j = stride; j < cells; j += 2 * stride) {
+            const std::int32_t* row = &samples[static_cast<std::size_t>(j * pitch)];
+            fill_row_between(row - stride * pitch, row + stride * pitch, cells, stride, (j / (2 * stride)) % 2 == 0,
+                             &out[static_cast<std::size_t>(j * pitch)]);
         }
     }
-    std::size_t next = static_cast<std::size_t>(pitch * pitch);
-    const auto mid_point = [&](int i0, int j0, int i1, int j1) {
-        const auto a = samples[static_cast<std::size_t>(j0 * pitch + i0)];
-        const auto b = samples[static_cast<std::size_t>(j1 * pitch + i1)];
-        const float own = 0.5f * static_cast<float>(a + b);  // |a + b| < 2^24: exact
-        const auto on_edge = [&](int level) {
-            const std::int64_t u = i0 + i1, v = j0 + j1;
-            return static_cast<float>(drawn_height(samples, n, {std::min(level, n - 1), 0}, u, v, 2).quanta());
-        };
-        out[next++] = {own, on_edge(1), on_edge(2)};
-    };
-    for (int k = 0; k < m; ++k) mid_point(k, 0, k + 1, 0);
-    for (int k = 0; k < m; ++k) mid_point(m, k, m, k + 1);
-    for (int k = 0; k < m; ++k) mid_point(k, m, k + 1, m);
-    for (int k = 0; k < m; ++k) mid_point(0, k, 0, k + 1);
+    // The whole tile is no cell of a coarser level of its own: its centre stays.
+    SlotVertex& centre = out[static_cast<std::size_t>(cells / 2 * pitch + cells / 2)];
+    centre.next_n = centre.height_n;
 }
 
 }  // namespace scree

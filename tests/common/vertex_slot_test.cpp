@@ -10,70 +10,72 @@ namespace {
 
 int birth(int i, int j, int n) {
     int level = 0;
-    while (level < n - 1 && i % (2 << level) == 0 && j % (2 << level) == 0) ++level;
+    while (level < n && i % (2 << level) == 0 && j % (2 << level) == 0) ++level;
     return level;
 }
 
-TEST(VertexSlot, HoldsTheGridAndItsBorderMidPoints) {
-    EXPECT_EQ(slot_vertex_count(5), 1217u);
-    EXPECT_EQ(slot_bytes(5), 14604u);
-}
-
-TEST(VertexSlot, HeightsAreTheSamplesAndTheNextLevelsSurfaces) {
-    SCREE_TRACE_SEED();
-    test::Random random(test::seed());
-    for (int n = 2; n <= 5; ++n) {
-        // Half a million: a quarter of a sum of such heights still fits a float exactly.
-        const auto samples = test::random_samples(random, n, 500000);
-        std::vector<SlotVertex> slot(slot_vertex_count(n));
-        fill_vertex_slot(samples, n, slot);
-        const int m = 1 << n;
-        for (int j = 0; j <= m; ++j)
-            for (int i = 0; i <= m; ++i) {
-                const SlotVertex& v = slot[static_cast<std::size_t>(j * (m + 1) + i)];
-                const int k = birth(i, j, n);
-                ASSERT_EQ(v.height_n, static_cast<float>(samples[static_cast<std::size_t>(j * (m + 1) + i)]));
-                ASSERT_EQ(v.next_n, drawn_height(samples, n, {std::min(k + 1, n - 1), 0}, i, j, 1).quanta())
-                    << i << ", " << j;
-                ASSERT_EQ(v.second_next_n, drawn_height(samples, n, {std::min(k + 2, n - 1), 0}, i, j, 1).quanta());
-            }
-    }
-}
-
-TEST(VertexSlot, NextHeightsAreExactAtTheExtremes) {
-    SCREE_TRACE_SEED();
-    test::Random random(test::seed());
-    const int n = 4, m = 16;
-    const auto samples = test::random_samples(random, n, kMaxHeightUnits);
+/// Every vertex of a slot filled from heights of up to `amplitude` quanta against the surface of the level above.
+void expect_next_heights(test::Random& random, int n, int amplitude) {
+    const auto samples = test::random_samples(random, n, amplitude);
     std::vector<SlotVertex> slot(slot_vertex_count(n));
     fill_vertex_slot(samples, n, slot);
+    const int m = 1 << n;
+    const auto at = [&](int i, int j) { return samples[static_cast<std::size_t>(j * (m + 1) + i)]; };
     for (int j = 0; j <= m; ++j)
         for (int i = 0; i <= m; ++i) {
+            const SlotVertex& v = slot[static_cast<std::size_t>(j * (m + 1) + i)];
             const int k = birth(i, j, n);
-            ASSERT_EQ(slot[static_cast<std::size_t>(j * (m + 1) + i)].next_n,
-                      drawn_height(samples, n, {std::min(k + 1, n - 1), 0}, i, j, 1).quanta());
+            double expected = at(i, j);
+            if (k + 1 < n) {
+                expected = drawn_height(samples, n, {k + 1, 0}, i, j, 1).quanta();
+            } else if (k + 1 == n && (i != m / 2 || j != m / 2)) {  // the mid-point of a whole edge of the tile
+                expected = 0.5 * (i == m / 2 ? double{1} * at(0, j) + at(m, j) : double{1} * at(i, 0) + at(i, m));
+            }
+            ASSERT_EQ(v.height_n, static_cast<float>(at(i, j)));
+            ASSERT_EQ(static_cast<double>(v.next_n), expected) << i << ", " << j << " of 2^" << n << " cells";
         }
 }
 
-TEST(VertexSlot, BorderMidPointsLieOnTheBorder) {
+TEST(VertexSlot, HoldsTheGridOnly) {
+    EXPECT_EQ(slot_vertex_count(5), 1089u);
+    EXPECT_EQ(slot_bytes(5), 8712u);
+}
+
+TEST(VertexSlot, NextHeightsLieOnTheNextLevelsSurface) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());
-    const int n = 3, m = 8;
-    const auto samples = test::random_samples(random, n, 500000);
-    std::vector<SlotVertex> slot(slot_vertex_count(n));
-    fill_vertex_slot(samples, n, slot);
-    std::size_t next = static_cast<std::size_t>((m + 1) * (m + 1));
-    const auto expect_mid = [&](std::int64_t u, std::int64_t v) {  // in half samples
-        const SlotVertex& mid = slot[next++];
-        EXPECT_EQ(mid.height_n, drawn_height(samples, n, {0, 0}, u, v, 2).quanta());
-        EXPECT_EQ(mid.next_n, drawn_height(samples, n, {1, 0}, u, v, 2).quanta());
-        EXPECT_EQ(mid.second_next_n, drawn_height(samples, n, {2, 0}, u, v, 2).quanta());
-    };
-    for (int k = 0; k < m; ++k) expect_mid(2 * k + 1, 0);
-    for (int k = 0; k < m; ++k) expect_mid(2 * m, 2 * k + 1);
-    for (int k = 0; k < m; ++k) expect_mid(2 * k + 1, 2 * m);
-    for (int k = 0; k < m; ++k) expect_mid(0, 2 * k + 1);
-    EXPECT_EQ(next, slot.size());
+    for (int n = 2; n <= 8; ++n) expect_next_heights(random, n, 500'000);
+}
+
+TEST(VertexSlot, NextHeightsAreExactInHalvesAtTheExtremes) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    for (int n = 2; n <= 5; ++n) expect_next_heights(random, n, kMaxHeightUnits);
+    for (const std::int32_t extreme : {-kMaxHeightUnits, kMaxHeightUnits}) {
+        std::vector<std::int32_t> samples(25, extreme);
+        samples[2] = extreme - (extreme > 0 ? 1 : -1);  // an odd sum: its half needs all 24 bits of a float
+        std::vector<SlotVertex> slot(25);
+        fill_vertex_slot(samples, 2, slot);
+        EXPECT_EQ(static_cast<double>(slot[1].next_n), 0.5 * (double{1} * samples[0] + samples[2]));
+        EXPECT_NE(slot[1].next_n, slot[1].height_n);
+    }
+}
+
+// Tiles side by side must agree on the vertices of their common edge, whatever lies to either side of it.
+TEST(VertexSlot, AnEdgesNextHeightsDependOnTheEdgeAlone) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    const int n = 4, m = 16, pitch = m + 1;
+    auto west = test::random_samples(random, n, kMaxHeightUnits);
+    auto east = test::random_samples(random, n, kMaxHeightUnits);
+    for (int j = 0; j <= m; ++j)
+        east[static_cast<std::size_t>(j * pitch)] = west[static_cast<std::size_t>(j * pitch + m)];
+    std::vector<SlotVertex> west_slot(slot_vertex_count(n)), east_slot(slot_vertex_count(n));
+    fill_vertex_slot(west, n, west_slot);
+    fill_vertex_slot(east, n, east_slot);
+    for (int j = 0; j <= m; ++j)
+        EXPECT_EQ(west_slot[static_cast<std::size_t>(j * pitch + m)].next_n,
+                  east_slot[static_cast<std::size_t>(j * pitch)].next_n);
 }
 
 }  // namespace
