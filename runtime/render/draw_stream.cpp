@@ -11,9 +11,12 @@ std::size_t DrawStream::attributes_offset(std::size_t region) const {
     return region * static_cast<std::size_t>(max_draws_) * sizeof(DrawAttributes);
 }
 
+std::size_t DrawStream::blends_offset(std::size_t region) const {
+    return attributes_offset(kRegions) + region * static_cast<std::size_t>(max_draws_) * sizeof(BlendAttributes);
+}
+
 std::size_t DrawStream::commands_offset(std::size_t region) const {
-    const auto draws = static_cast<std::size_t>(max_draws_);
-    return kRegions * draws * sizeof(DrawAttributes) + region * draws * sizeof(DrawCommand);
+    return blends_offset(kRegions) + region * static_cast<std::size_t>(max_draws_) * sizeof(DrawCommand);
 }
 
 Result<DrawStream> DrawStream::create(int max_draws) {
@@ -50,8 +53,10 @@ DrawStream::Region DrawStream::begin_frame() {
     Region region;
     region.commands_offset = commands_offset(current_);
     region.attributes_offset = attributes_offset(current_);
+    region.blends_offset = blends_offset(current_);
     region.commands = {reinterpret_cast<DrawCommand*>(mapped_ + region.commands_offset), draws};
     region.attributes = {reinterpret_cast<DrawAttributes*>(mapped_ + region.attributes_offset), draws};
+    region.blends = {reinterpret_cast<BlendAttributes*>(mapped_ + region.blends_offset), draws};
     return region;
 }
 

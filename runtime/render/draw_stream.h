@@ -24,7 +24,7 @@ struct DrawCommand {
 };
 static_assert(sizeof(DrawCommand) == 20);
 
-/// The attributes kTileAttribute and kTextureAttribute (shaders/shared_constants.glsl) of one draw.
+/// The attributes that every draw has, kTileAttribute to kEdgeMorphAttribute (shaders/shared_constants.glsl).
 struct DrawAttributes {
     std::int32_t lattice_i = 0, lattice_j = 0;  ///< the tile's north-west corner, finest cells
     std::int32_t step = 1;                      ///< finest cells from one sample to the next
@@ -33,8 +33,26 @@ struct DrawAttributes {
     float texture_scale = 1;
     float texture_offset_u = 0;
     float texture_offset_v = 0;
+    std::int32_t stride = 1;  ///< samples from one vertex to the next
+    std::uint32_t edge_mask = 0;
+    float morph = 0;
+    std::array<float, 4> edge_morph{};
 };
-static_assert(sizeof(DrawAttributes) == 32);
+static_assert(sizeof(DrawAttributes) == 60);
+
+/// A texture that a blended draw looks at besides its own: layer | kInOtherArray, or kNoTexture.
+using TextureCode = std::uint16_t;
+
+/// The further attributes of a blended draw, kCoarseAttribute to kNeighboursAttribute.
+struct BlendAttributes {
+    float coarse_scale = 1;
+    float coarse_offset_u = 0;
+    float coarse_offset_v = 0;
+    float texture_share = 1;
+    std::uint32_t coarse = 0;                 ///< a TextureCode
+    std::array<TextureCode, 8> neighbours{};  ///< in TextureSide's order
+};
+static_assert(sizeof(BlendAttributes) == 36);
 
 class DrawStream {
 public:
@@ -50,8 +68,10 @@ public:
     struct Region {
         std::span<DrawCommand> commands;
         std::span<DrawAttributes> attributes;
+        std::span<BlendAttributes> blends;
         std::size_t commands_offset = 0;
         std::size_t attributes_offset = 0;
+        std::size_t blends_offset = 0;
     };
     /// The next region, after the GPU has done with it (three frames ago: hardly ever a wait).
     Region begin_frame();
@@ -74,6 +94,7 @@ private:
     };
     std::size_t commands_offset(std::size_t region) const;
     std::size_t attributes_offset(std::size_t region) const;
+    std::size_t blends_offset(std::size_t region) const;
 
     BufferHandle buffer_;
     std::byte* mapped_ = nullptr;

@@ -60,21 +60,29 @@ Result<ProgramHandle> build_program(const ProgramSources& sources) {
     return program;
 }
 
-std::vector<std::string> terrain_vertex_sources(int tile_cells_log2) {
+std::vector<std::string> terrain_vertex_sources(int tile_cells_log2, Imagery imagery) {
     using namespace shader_source;
     // A constant, so that the compiler turns the division by it into a multiplication.
-    return {std::string(shared_constants), fmt::format("const int kTileSamples = {};\n", (1 << tile_cells_log2) + 1),
-            std::string(terrain_position), std::string(atmosphere), std::string(terrain_vert)};
+    return {imagery == Imagery::plain ? "" : "#define SCREE_BLENDED\n",
+            std::string(shared_constants),
+            fmt::format("const int kTileSamples = {};\n", (1 << tile_cells_log2) + 1),
+            std::string(terrain_position),
+            std::string(terrain_morph),
+            std::string(atmosphere),
+            std::string(terrain_vert)};
 }
 
-Result<ProgramHandle> build_terrain_program(int tile_cells_log2, TerrainVariant variant) {
+Result<ProgramHandle> build_terrain_program(const TerrainVariant& variant) {
     using namespace shader_source;
-    return build_program(
-        {"terrain",
-         terrain_vertex_sources(tile_cells_log2),
-         {std::string(shared_constants), with_bool("kWithHaze", variant.with_haze),
-          with_bool("kColourByLevel", variant.colour_by_level), std::string(atmosphere), std::string(terrain_frag)},
-         {}});
+    return build_program({"terrain",
+                          terrain_vertex_sources(variant.tile_cells_log2, variant.imagery),
+                          {std::string(shared_constants), with_bool("kWithHaze", variant.with_haze),
+                           with_bool("kColourByLevel", variant.colour_by_level),
+                           with_bool("kTwoArrays", variant.imagery == Imagery::blended_of_two_arrays),
+                           fmt::format("const float kTextureTexels = {}.0;\n", 1 << variant.texture_size_log2),
+                           std::string(variant.imagery == Imagery::plain ? imagery_plain : imagery_blended),
+                           std::string(atmosphere), std::string(terrain_frag)},
+                          {}});
 }
 
 Result<ProgramHandle> build_sky_program() {

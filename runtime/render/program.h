@@ -2,6 +2,7 @@
 // carry the compiler's log; a shader that does not compile on a driver is a defect here or there, never the user's.
 #pragma once
 
+#include <cstddef>
 #include <span>
 #include <string>
 #include <string_view>
@@ -12,16 +13,23 @@
 
 namespace scree {
 
+/// What the draws of a program look at: one texture; several of one array; several of two arrays.
+enum class Imagery { plain, blended, blended_of_two_arrays };
+inline constexpr std::size_t kImageryKinds = 3;
+
 struct TerrainVariant {
+    int tile_cells_log2 = 5;
+    int texture_size_log2 = 8;
+    Imagery imagery = Imagery::plain;
     bool with_haze = false;
     bool colour_by_level = false;
 };
 
-Result<ProgramHandle> build_terrain_program(int tile_cells_log2, TerrainVariant variant);
+Result<ProgramHandle> build_terrain_program(const TerrainVariant& variant);
 Result<ProgramHandle> build_sky_program();
 
 /// The strings that make the terrain's vertex shader, in order.
-std::vector<std::string> terrain_vertex_sources(int tile_cells_log2);
+std::vector<std::string> terrain_vertex_sources(int tile_cells_log2, Imagery imagery);
 
 struct ProgramSources {
     std::string name;                           ///< for messages

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "common/mesh/tile_patterns.h"
+#include "runtime/render/draw_batches.h"
 #include "runtime/render/draw_stream.h"
 #include "runtime/render/program.h"
 #include "runtime/render/shader_constants.h"
@@ -24,6 +25,7 @@ namespace {
 
 constexpr GLuint kVertexBinding = 0;
 constexpr GLuint kDrawBinding = 1;
+constexpr GLuint kBlendBinding = 2;
 
 /// Haze of the sky below the horizon where the scene asks for none.
 constexpr double kBackdropHaze_m = 20'000;
@@ -63,20 +65,46 @@ IndexArena make_index_arena(int tile_cells_log2) {
     return arena;
 }
 
-VertexArrayHandle make_vertex_array(const VertexArena& vertices, const IndexArena& indices) {
+/// Names vertex attributes of one vertex array.
+class AttributeFormats {
+public:
+    explicit AttributeFormats(GLuint vertex_array) : vertex_array_(vertex_array) {}
+    void floats(int location, GLuint binding, GLint count, std::size_t offset) const {
+        glVertexArrayAttribFormat(vertex_array_, enabled(location, binding), count, GL_FLOAT, GL_FALSE,
+                                  static_cast<GLuint>(offset));
+    }
+    void integers(int location, GLuint binding, GLint count, GLenum type, std::size_t offset) const {
+        glVertexArrayAttribIFormat(vertex_array_, enabled(location, binding), count, type, static_cast<GLuint>(offset));
+    }
+
+private:
+    GLuint enabled(int location, GLuint binding) const {
+        const auto index = static_cast<GLuint>(location);
+        glEnableVertexArrayAttrib(vertex_array_, index);
+        glVertexArrayAttribBinding(vertex_array_, index, binding);
+        return index;
+    }
+    GLuint vertex_array_;
+};
+
+VertexArrayHandle make_vertex_array(const VertexArena& vertices, const IndexArena& indices, bool blended) {
     GLuint name = 0;
     glCreateVertexArrays(1, &name);
-    const auto attribute = [name](int location, GLuint binding) {
-        const auto index = static_cast<GLuint>(location);
-        glEnableVertexArrayAttrib(name, index);
-        glVertexArrayAttribBinding(name, index, binding);
-        return index;
-    };
-    glVertexArrayAttribFormat(name, attribute(shader::kHeightAttribute, kVertexBinding), 3, GL_FLOAT, GL_FALSE, 0);
-    glVertexArrayAttribIFormat(name, attribute(shader::kTileAttribute, kDrawBinding), 4, GL_INT,
-                               offsetof(DrawAttributes, lattice_i));
-    glVertexArrayAttribFormat(name, attribute(shader::kTextureAttribute, kDrawBinding), 4, GL_FLOAT, GL_FALSE,
-                              offsetof(DrawAttributes, texture_layer));
+    const AttributeFormats formats(name);
+    formats.floats(shader::kHeightAttribute, kVertexBinding, 2, 0);
+    formats.integers(shader::kTileAttribute, kDrawBinding, 4, GL_INT, offsetof(DrawAttributes, lattice_i));
+    formats.floats(shader::kTextureAttribute, kDrawBinding, 4, offsetof(DrawAttributes, texture_layer));
+    formats.integers(shader::kPatternAttribute, kDrawBinding, 2, GL_INT, offsetof(DrawAttributes, stride));
+    formats.floats(shader::kMorphAttribute, kDrawBinding, 1, offsetof(DrawAttributes, morph));
+    formats.floats(shader::kEdgeMorphAttribute, kDrawBinding, 4, offsetof(DrawAttributes, edge_morph));
+    if (blended) {
+        formats.floats(shader::kCoarseAttribute, kBlendBinding, 4, offsetof(BlendAttributes, coarse_scale));
+        formats.integers(shader::kCoarseCodeAttribute, kBlendBinding, 1, GL_UNSIGNED_INT,
+                         offsetof(BlendAttributes, coarse));
+        formats.integers(shader::kNeighboursAttribute, kBlendBinding, 4, GL_UNSIGNED_INT,
+                         offsetof(BlendAttributes, neighbours));
+        glVertexArrayBindingDivisor(name, kBlendBinding, 1);
+    }
     glVertexArrayBindingDivisor(name, kDrawBinding, 1);
     glVertexArrayVertexBuffer(name, kVertexBinding, vertices.buffer(), 0, sizeof(SlotVertex));
     glVertexArrayElementBuffer(name, indices.buffer.name());
@@ -106,6 +134,7 @@ void set_position(GLuint program, const Camera& camera, const RelativeFrame& fra
     glProgramUniform1f(program, shader::kSpacingUniform, frame.spacing_m);
     glProgramUniform1f(program, shader::kQuantumUniform, frame.quantum_m);
     glProgramUniform3fv(program, shader::kFractionUniform, 1, &frame.fraction_m.x);
+    glProgramUniform1f(program, shader::kHalfCurvatureUniform, frame.half_curvature);
 }
 
 }  // namespace
@@ -120,89 +149,138 @@ struct Renderer::State {
     VertexArena vertices;
     TextureArena textures;
     IndexArena indices;
+    DrawBatches batches;
     DrawStream stream;
-    VertexArrayHandle terrain_array;
+    VertexArrayHandle plain_array, blended_array;
     VertexArrayHandle sky_array;  ///< no attributes
     ProgramHandle sky;
-    std::array<ProgramHandle, 4> terrain;  ///< [haze + 2 * colour by level]
+    std::array<std::array<ProgramHandle, 4>, kImageryKinds> terrain;  ///< [imagery][haze + 2 * colour by level]
 
-    struct Batch {
-        std::size_t first = 0;
-        std::size_t count = 0;
-    };
-    std::vector<Batch> batches;  ///< one a texture array
-
-    /// Orders the draws by texture array, otherwise as given, and writes them to the region.
+    Result<void> build_programs();
+    /// Writes the draws to the region, batch by batch; returns their triangles.
     std::uint64_t write_draws(std::span<const DrawItem> items, const DrawStream::Region& region);
+    DrawAttributes attributes_of(const DrawItem& item) const;
+    BlendAttributes blend_of(const DrawItem& item, const DrawBatch& batch) const;
+    TextureCode texture_code(std::int32_t slot, const DrawBatch& batch) const;
     void draw_terrain(const Camera& camera, const FrameSettings& settings, const DrawStream::Region& region,
                       FrameTimes& times);
+    void draw_batch(const DrawBatch& batch, const FrameSettings& settings, const DrawStream::Region& region) const;
     void draw_sky(const Camera& camera, const FrameSettings& settings);
 };
 
+Result<void> Renderer::State::build_programs() {
+    auto built = build_sky_program();
+    if (!built) return built.error();
+    sky = std::move(*built);
+    for (std::size_t imagery = 0; imagery < kImageryKinds; ++imagery) {
+        for (std::size_t look = 0; look < terrain[imagery].size(); ++look) {
+            built = build_terrain_program({options.lattice.tile_cells_log2, options.texture_size_log2,
+                                           static_cast<Imagery>(imagery), (look & 1) != 0, (look & 2) != 0});
+            if (!built) return built.error();
+            terrain[imagery][look] = std::move(*built);
+        }
+    }
+    return {};
+}
+
+DrawAttributes Renderer::State::attributes_of(const DrawItem& item) const {
+    assert(options.lattice.contains(item.tile) && item.tile.level <= options.lattice.deepest_level);
+    assert(item.height_slot >= 0 && item.height_slot < vertices.slots());
+    assert(item.edge_mask < kEdgeMaskCount);
+    const LatticePoint corner = options.lattice.corner(item.tile);
+    return {static_cast<std::int32_t>(corner.i),
+            static_cast<std::int32_t>(corner.j),
+            static_cast<std::int32_t>(options.lattice.step(item.tile.level)),
+            item.height_slot * vertices.slot_vertices(),
+            static_cast<float>(textures.layer_of(item.texture.slot)),
+            item.texture.scale,
+            item.texture.offset_u,
+            item.texture.offset_v,
+            1 << item.geomip,
+            item.edge_mask,
+            item.morph,
+            item.edge_morph};
+}
+
+TextureCode Renderer::State::texture_code(std::int32_t slot, const DrawBatch& batch) const {
+    static_assert(kMaxArrayLayers <= shader::kTextureLayerMask + 1);
+    assert(slot < textures.slots());
+    if (slot < 0) return shader::kNoTexture;
+    const int array = textures.array_of(slot), layer = textures.layer_of(slot);
+    if (array == batch.array) return static_cast<TextureCode>(layer);
+    if (array == batch.other_array) return static_cast<TextureCode>(layer | shader::kInOtherArray);
+    return shader::kNoTexture;
+}
+
+BlendAttributes Renderer::State::blend_of(const DrawItem& item, const DrawBatch& batch) const {
+    BlendAttributes blend;
+    const TexturePlacement& coarse = item.texture_share < 1 ? item.coarse_texture : item.texture;
+    blend.coarse_scale = coarse.scale;
+    blend.coarse_offset_u = coarse.offset_u;
+    blend.coarse_offset_v = coarse.offset_v;
+    blend.texture_share = std::min(item.texture_share, 1.0f);
+    blend.coarse = texture_code(coarse.slot, batch);
+    for (std::size_t side = 0; side < blend.neighbours.size(); ++side)
+        blend.neighbours[side] = texture_code(item.neighbour_textures[side], batch);
+    return blend;
+}
+
 std::uint64_t Renderer::State::write_draws(std::span<const DrawItem> items, const DrawStream::Region& region) {
-    const auto layers = textures.layers_per_array();
-    const auto batch_of = [&](const DrawItem& item) -> Batch& {
-        return batches[static_cast<std::size_t>(item.texture_slot / layers)];
-    };
-    for (Batch& batch : batches) batch = {};
-    for (const DrawItem& item : items) {
-        assert(item.height_slot >= 0 && item.height_slot < vertices.slots());
-        assert(item.texture_slot >= 0 && item.texture_slot < textures.slots());
-        ++batch_of(item).count;
-    }
-    std::size_t next = 0;
-    for (Batch& batch : batches) {
-        batch.first = next;
-        next += batch.count;
-        batch.count = 0;
-    }
+    batches.sort(items);
     std::uint64_t triangles = 0;
-    for (const DrawItem& item : items) {
-        assert(options.lattice.contains(item.tile) && item.tile.level <= options.lattice.deepest_level);
-        assert(item.edge_mask < kEdgeMaskCount);
+    for (std::size_t k = 0; k < items.size(); ++k) {
+        const DrawItem& item = items[k];
+        const DrawBatch& batch = batches.batch_of(k);
+        const std::size_t draw = batches.place_of(k);
         const PatternRange pattern = indices.patterns.range(item.geomip, item.edge_mask, item.part);
-        const LatticePoint corner = options.lattice.corner(item.tile);
-        const std::int32_t first_vertex = item.height_slot * vertices.slot_vertices();
-        Batch& batch = batch_of(item);
-        const std::size_t draw = batch.first + batch.count++;
-        region.commands[draw] = {pattern.count, 1, pattern.first, first_vertex, static_cast<std::uint32_t>(draw)};
-        region.attributes[draw] = {static_cast<std::int32_t>(corner.i),
-                                   static_cast<std::int32_t>(corner.j),
-                                   static_cast<std::int32_t>(options.lattice.step(item.tile.level)),
-                                   first_vertex,
-                                   static_cast<float>(item.texture_slot % layers),
-                                   item.texture_scale,
-                                   item.texture_offset_u,
-                                   item.texture_offset_v};
+        region.attributes[draw] = attributes_of(item);
+        region.commands[draw] = {pattern.count, 1, pattern.first, item.height_slot * vertices.slot_vertices(),
+                                 static_cast<std::uint32_t>(draw)};
+        if (batch.blended) region.blends[draw] = blend_of(item, batch);
         triangles += pattern.count / 3;
     }
     return triangles;
 }
 
+void Renderer::State::draw_batch(const DrawBatch& batch, const FrameSettings& settings,
+                                 const DrawStream::Region& region) const {
+    const std::size_t look = (settings.haze_distance_m > 0 ? 1u : 0u) + (settings.colour_by_level ? 2u : 0u);
+    const Imagery imagery = !batch.blended                     ? Imagery::plain
+                            : batch.array == batch.other_array ? Imagery::blended
+                                                               : Imagery::blended_of_two_arrays;
+    const auto bind = [this](int unit, int array) {
+        glBindTextureUnit(static_cast<GLuint>(unit), textures.arrays()[static_cast<std::size_t>(array)].name());
+    };
+    glUseProgram(terrain[static_cast<std::size_t>(imagery)][look].name());
+    glBindVertexArray(batch.blended ? blended_array.name() : plain_array.name());
+    bind(shader::kImageryTextureUnit, batch.array);
+    if (batch.blended) bind(shader::kOtherImageryTextureUnit, batch.other_array);
+    glMultiDrawElementsIndirect(
+        GL_TRIANGLES, indices.type,
+        reinterpret_cast<const void*>(region.commands_offset + batch.first * sizeof(DrawCommand)),
+        static_cast<GLsizei>(batch.count), sizeof(DrawCommand));
+}
+
 void Renderer::State::draw_terrain(const Camera& camera, const FrameSettings& settings,
                                    const DrawStream::Region& region, FrameTimes& times) {
-    const std::size_t variant = (settings.haze_distance_m > 0 ? 1u : 0u) + (settings.colour_by_level ? 2u : 0u);
-    const GLuint program = terrain[variant].name();
-    set_position(program, camera,
-                 make_relative_frame(options.lattice, options.height_offset_m, options.height_quantum_m, camera.eye));
-    set_atmosphere(program, camera, settings);
-    glUseProgram(program);
-    glVertexArrayVertexBuffer(terrain_array.name(), kDrawBinding, stream.buffer(),
-                              static_cast<GLintptr>(region.attributes_offset), sizeof(DrawAttributes));
-    glBindVertexArray(terrain_array.name());
+    const RelativeFrame frame = make_relative_frame(options.lattice, options.height_offset_m, options.height_quantum_m,
+                                                    camera.eye, settings.half_curvature);
+    const std::size_t look = (settings.haze_distance_m > 0 ? 1u : 0u) + (settings.colour_by_level ? 2u : 0u);
+    for (const auto& kind : terrain) {
+        set_position(kind[look].name(), camera, frame);
+        set_atmosphere(kind[look].name(), camera, settings);
+    }
+    for (const GLuint array : {plain_array.name(), blended_array.name()})
+        glVertexArrayVertexBuffer(array, kDrawBinding, stream.buffer(), static_cast<GLintptr>(region.attributes_offset),
+                                  sizeof(DrawAttributes));
+    glVertexArrayVertexBuffer(blended_array.name(), kBlendBinding, stream.buffer(),
+                              static_cast<GLintptr>(region.blends_offset), sizeof(BlendAttributes));
     glBindBuffer(GL_DRAW_INDIRECT_BUFFER, stream.buffer());
     glPolygonMode(GL_FRONT_AND_BACK, settings.wireframe ? GL_LINE : GL_FILL);
-    for (std::size_t array = 0; array < batches.size(); ++array) {
-        const Batch& batch = batches[array];
-        if (batch.count == 0) continue;
-        glBindTextureUnit(static_cast<GLuint>(shader::kImageryTextureUnit), textures.arrays()[array].name());
-        glMultiDrawElementsIndirect(
-            GL_TRIANGLES, indices.type,
-            reinterpret_cast<const void*>(region.commands_offset + batch.first * sizeof(DrawCommand)),
-            static_cast<GLsizei>(batch.count), sizeof(DrawCommand));
-        ++times.multi_draws;
-    }
+    for (const DrawBatch& batch : batches.batches()) draw_batch(batch, settings, region);
     glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
+    times.multi_draws = static_cast<std::uint32_t>(batches.batches().size());
+    times.blended_draws = static_cast<std::uint32_t>(batches.blended_draws());
 }
 
 void Renderer::State::draw_sky(const Camera& camera, const FrameSettings& settings) {
@@ -225,28 +303,23 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const RendererOptions& option
     auto vertices = VertexArena::create(tile_cells_log2, options.height_slots);
     if (!vertices) return vertices.error();
     state->vertices = std::move(*vertices);
-    auto textures = TextureArena::create({options.texture_size_log2, options.texture_slots, options.anisotropy});
+    auto textures = TextureArena::create(
+        {options.texture_size_log2, options.texture_slots, options.anisotropy, options.max_array_layers});
     if (!textures) return textures.error();
     state->textures = std::move(*textures);
     auto stream = DrawStream::create(options.max_draws);
     if (!stream) return stream.error();
     state->stream = std::move(*stream);
 
-    auto sky = build_sky_program();
-    if (!sky) return sky.error();
-    state->sky = std::move(*sky);
-    for (std::size_t variant = 0; variant < state->terrain.size(); ++variant) {
-        auto terrain = build_terrain_program(tile_cells_log2, {(variant & 1) != 0, (variant & 2) != 0});
-        if (!terrain) return terrain.error();
-        state->terrain[variant] = std::move(*terrain);
-    }
-
+    if (const auto built = state->build_programs(); !built) return built.error();
     state->indices = make_index_arena(tile_cells_log2);
-    state->terrain_array = make_vertex_array(state->vertices, state->indices);
+    state->plain_array = make_vertex_array(state->vertices, state->indices, false);
+    state->blended_array = make_vertex_array(state->vertices, state->indices, true);
     GLuint empty = 0;
     glCreateVertexArrays(1, &empty);
     state->sky_array = VertexArrayHandle(empty);
-    state->batches.resize(state->textures.arrays().size());
+    state->batches = DrawBatches(static_cast<int>(state->textures.arrays().size()), state->textures.layers_per_array(),
+                                 options.max_draws);
     if (glGetError() != GL_NO_ERROR)
         return Error{ErrorCode::display, "OpenGL has no memory for the index lists of this tile size"};
     return std::unique_ptr<Renderer>(new Renderer(std::move(state)));

@@ -15,6 +15,7 @@ constexpr GLenum kFormat = GL_COMPRESSED_SRGB_ALPHA_S3TC_DXT1_EXT;
 
 Result<TextureArena> TextureArena::create(const TextureArenaOptions& options) {
     assert(options.slots >= 1 && options.anisotropy >= 1);
+    assert(options.max_array_layers >= 1 && options.max_array_layers <= kMaxArrayLayers);
     GLint driver_layers = 0;
     glGetIntegerv(GL_MAX_ARRAY_TEXTURE_LAYERS, &driver_layers);
     float anisotropy = 1;
@@ -26,7 +27,7 @@ Result<TextureArena> TextureArena::create(const TextureArenaOptions& options) {
     TextureArena arena;
     arena.texture_size_log2_ = options.texture_size_log2;
     arena.slots_ = options.slots;
-    arena.layers_per_array_ = std::min({kMaxArrayLayers, static_cast<int>(driver_layers), options.slots});
+    arena.layers_per_array_ = std::min({options.max_array_layers, static_cast<int>(driver_layers), options.slots});
     const GLsizei size = 1 << options.texture_size_log2;
     for (int first = 0; first < options.slots; first += arena.layers_per_array_) {
         GLuint name = 0;
@@ -49,12 +50,12 @@ Result<TextureArena> TextureArena::create(const TextureArenaOptions& options) {
 
 void TextureArena::upload(int slot, std::span<const std::uint8_t> chain) {
     assert(slot >= 0 && slot < slots_ && chain.size() == bc1_chain_bytes(texture_size_log2_));
-    const GLuint array = arrays_[static_cast<std::size_t>(slot / layers_per_array_)].name();
+    const GLuint array = arrays_[static_cast<std::size_t>(array_of(slot))].name();
     for (int mip = 0; mip <= texture_size_log2_; ++mip) {
         const GLsizei size = 1 << (texture_size_log2_ - mip);
         const auto bytes =
             chain.subspan(bc1_mip_offset(texture_size_log2_, mip), bc1_mip_bytes(texture_size_log2_, mip));
-        glCompressedTextureSubImage3D(array, mip, 0, 0, slot % layers_per_array_, size, size, 1, kFormat,
+        glCompressedTextureSubImage3D(array, mip, 0, 0, layer_of(slot), size, size, 1, kFormat,
                                       static_cast<GLsizei>(bytes.size()), bytes.data());
     }
 }

@@ -14,7 +14,8 @@
 namespace scree {
 
 /// Layers of one array at most. 2048 layers of 256^2 texels are 90 MB: large budgets need a handful of arrays, and each
-/// array is one multi-draw. Below this the smaller of the driver's limit and this holds.
+/// array is one multi-draw. Below this the smaller of the driver's limit and this holds. A TextureCode has 14 bits for
+/// a layer.
 inline constexpr int kMaxArrayLayers = 2048;
 
 /// What an arena of `slots` slots takes of a memory budget.
@@ -28,6 +29,7 @@ struct TextureArenaOptions {
     /// 1: off. Up to 16: sharper imagery at grazing angles, bounded by the driver. Free on a GPU; any degree costs 5 to
     /// 6 ms a full screen of 800x800 on software OpenGL.
     double anisotropy = 1;
+    int max_array_layers = kMaxArrayLayers;  ///< tests take fewer to have several arrays
 };
 
 class TextureArena {
@@ -42,6 +44,8 @@ public:
 
     int slots() const { return slots_; }
     int layers_per_array() const { return layers_per_array_; }
+    int array_of(int slot) const { return slot / layers_per_array_; }
+    int layer_of(int slot) const { return slot % layers_per_array_; }
     const std::vector<TextureHandle>& arrays() const { return arrays_; }
 
 private:

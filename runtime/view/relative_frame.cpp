@@ -14,6 +14,11 @@ glm::vec3 RelativeFrame::position(std::int32_t i, std::int32_t j, float height_n
     return {x, y, z - (x * x + y * y + morph_reach_m2) * half_curvature};
 }
 
+float RelativeFrame::morph_reach_m2(VertexMorph morph, std::int64_t step) const {
+    const float side_m = static_cast<float>(step) * spacing_m;
+    return morph.weight * (morph.reach_squared * (side_m * side_m));
+}
+
 RelativeFrame make_relative_frame(const Lattice& lattice, double height_offset_m, double height_quantum_m,
                                   glm::dvec3 eye, double half_curvature) {
     const auto nearest = [](double value, double low, double high) {

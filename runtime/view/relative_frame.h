@@ -1,5 +1,5 @@
 // RelativeFrame: how lattice integers become camera-relative float positions, bit-identically from both sides of a tile
-// edge and in GLSL (runtime/render/shaders/terrain_position.glsl holds the same three lines):
+// edge and in GLSL (runtime/render/shaders/terrain_position.glsl holds the same lines):
 //     x = float(i - i0) * spacing - frac_x      one integer subtraction, one multiplication, one subtraction
 // (i0, j0, n0) is the lattice point nearest the eye, clamped to the dataset; frac is what is left of the eye, in
 // metres. Earth curvature lowers a point by the square of its horizontal distance over twice the radius.
@@ -10,6 +10,7 @@
 #include <glm/glm.hpp>
 
 #include "common/lattice.h"
+#include "common/mesh/morphed_vertex.h"
 
 namespace scree {
 
@@ -24,6 +25,9 @@ struct RelativeFrame {
     /// z is lowered by (x^2 + y^2 + morph_reach_m2) * half_curvature. morph_reach_m2: VertexMorph's weight times its
     /// squared reach in metres, so that a vertex that has moved wholly lies on the middle of its neighbours' line.
     glm::vec3 position(std::int32_t i, std::int32_t j, float height_n, float morph_reach_m2 = 0) const;
+    /// What `position` wants to know of a vertex of a tile whose samples are `step` finest cells apart. A tile of twice
+    /// the step counts half as many samples: everything scales by powers of two, so both come to the same bits.
+    float morph_reach_m2(VertexMorph morph, std::int64_t step) const;
 };
 
 RelativeFrame make_relative_frame(const Lattice& lattice, double height_offset_m, double height_quantum_m,

@@ -1,9 +1,20 @@
 // Valid as GLSL and as C++: every program starts with this file, and shader_constants.h includes it.
 
-// Vertex attributes. The first advances by vertex, the other two by draw (divisor 1).
-const int kHeightAttribute = 0;   // vec3: heights in quanta {own, next, second next}
-const int kTileAttribute = 1;     // ivec4: lattice i, j of the north-west corner, cells between samples, first vertex
-const int kTextureAttribute = 2;  // vec4: layer, scale, offset u, offset v
+// Vertex attributes. The first advances by vertex, the others by draw (divisor 1); the last three are of blended draws.
+const int kHeightAttribute = 0;      // vec2: heights in quanta {own, on the next coarser surface}
+const int kTileAttribute = 1;        // ivec4: lattice i, j of the north-west corner, cells between samples, first vertex
+const int kTextureAttribute = 2;     // vec4: layer, scale, offset u, offset v
+const int kPatternAttribute = 3;     // ivec2: samples between vertices, edges thinned by 2 (EdgeMask)
+const int kMorphAttribute = 4;       // float: weight of inner vertices
+const int kEdgeMorphAttribute = 5;   // vec4: weights of the north, east, south and west edge's vertices
+const int kCoarseAttribute = 6;      // vec4: scale, offset u, offset v of the coarse texture, share of the own one
+const int kCoarseCodeAttribute = 7;  // uint: which texture the coarse one is
+const int kNeighboursAttribute = 8;  // uvec4: the textures round the own one, two to a word, by TextureSide
+
+// How 16 bits name a texture of a blended draw: a layer of its own array or of the other one it is drawn with.
+const int kInOtherArray = 0x4000;
+const int kTextureLayerMask = 0x3fff;
+const int kNoTexture = 0x8000;
 
 // Uniform locations.
 const int kClipFromRelativeUniform = 0;  // mat4
@@ -14,5 +25,7 @@ const int kFractionUniform = 4;          // vec3: eye minus the anchor's positio
 const int kSunUniform = 5;               // vec3: unit direction towards the sun
 const int kHazeUniform = 6;              // vec4: see atmosphere.glsl
 const int kRayFromScreenUniform = 7;     // mat3: {x, y, 1} on the screen, -1..1, to a view ray (not normalised)
+const int kHalfCurvatureUniform = 8;     // float: 1 / (2 R), 1/m; 0: flat
 
 const int kImageryTextureUnit = 0;
+const int kOtherImageryTextureUnit = 1;  // blended draws only

@@ -1,10 +1,7 @@
-// Imagery, then haze. kWithHaze and kColourByLevel are set when the program is built.
-layout(binding = kImageryTextureUnit) uniform sampler2DArray imagery;
-
+// Imagery (imagery_texel(), of one of two files), then haze. kWithHaze and kColourByLevel are set when the program is
+// built.
 in vec3 relative_m;
 in float haze_density;
-in vec2 texture_position;
-flat in float texture_layer;
 flat in int tile_step;
 
 out vec4 fragment_colour;
@@ -15,7 +12,7 @@ vec3 level_colour() {
 }
 
 void main() {
-    vec4 texel = texture(imagery, vec3(texture_position, texture_layer));
+    vec4 texel = imagery_texel();
     // Alpha 0 means "no heights here". Such texels decode to black, so filtering premultiplies: divide by what is there.
     if (texel.a < 0.5) discard;
     vec3 colour = texel.rgb / texel.a;

@@ -1,5 +1,6 @@
-// One tile vertex. kTileSamples (m + 1) is set when the program is built.
-layout(location = kHeightAttribute) in vec3 heights_n;
+// One tile vertex. kTileSamples (m + 1), and SCREE_BLENDED for draws that look at several textures, are set when the
+// program is built.
+layout(location = kHeightAttribute) in vec2 heights_n;
 layout(location = kTileAttribute) in ivec4 tile;
 layout(location = kTextureAttribute) in vec4 placement;
 
@@ -11,13 +12,33 @@ out vec2 texture_position;
 flat out float texture_layer;
 flat out int tile_step;
 
+#ifdef SCREE_BLENDED
+layout(location = kCoarseAttribute) in vec4 coarse;
+layout(location = kCoarseCodeAttribute) in uint coarse_code;
+layout(location = kNeighboursAttribute) in uvec4 neighbours;
+
+out vec2 coarse_position;
+flat out float texture_share;
+flat out uint coarse_texture;
+flat out uvec4 neighbour_textures;
+#endif
+
 void main() {
     int local = gl_VertexID - tile.w;
     ivec2 sample_index = ivec2(local % kTileSamples, local / kTileSamples);
-    relative_m = relative_position(tile.xy + sample_index * tile.z, heights_n.x);
-    haze_density = mean_haze_density(relative_m.z);
-    texture_position = placement.zw + placement.y * (vec2(sample_index) / float(kTileSamples - 1));
+    vec2 morph = vertex_morph(sample_index);
+    vec3 flat_m = flat_position(tile.xy + sample_index * tile.z, morphed_height(heights_n, morph.x));
+    relative_m = curved_position(flat_m, curvature_drop(flat_m, morph_reach_m2(morph.x, morph.y, tile.z)));
+    haze_density = mean_haze_density(flat_m.z);  // air follows the curve of the ground
+    vec2 tile_position = vec2(sample_index) / float(kTileCells);
+    texture_position = placement.zw + placement.y * tile_position;
     texture_layer = placement.x;
     tile_step = tile.z;
+#ifdef SCREE_BLENDED
+    coarse_position = coarse.yz + coarse.x * tile_position;
+    texture_share = coarse.w;
+    coarse_texture = coarse_code;
+    neighbour_textures = neighbours;
+#endif
     gl_Position = clip_from_relative * vec4(relative_m, 1.0);
 }

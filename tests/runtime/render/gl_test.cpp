@@ -66,7 +66,7 @@ std::vector<std::uint8_t> plain_texture(int size_log2, std::uint16_t colour) {
 }
 
 std::vector<SlotVertex> flat_slot(int tile_cells_log2, float height_n) {
-    return std::vector<SlotVertex>(slot_vertex_count(tile_cells_log2), SlotVertex{height_n, height_n, height_n});
+    return std::vector<SlotVertex>(slot_vertex_count(tile_cells_log2), SlotVertex{height_n, height_n});
 }
 
 }  // namespace scree

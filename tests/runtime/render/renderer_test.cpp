@@ -135,7 +135,7 @@ TEST_F(RendererTest, NorthIsUpAndEastIsRightSeenFromAbove) {
     make_small();
     renderer_->upload_texture(2, quadrants_texture());
     DrawItem root;
-    root.texture_slot = 2;
+    root.texture.slot = 2;
     const Picture picture = draw(from_above(386), {root}, bare());
     EXPECT_EQ(picture.at(kNear, kNear), kRed);
     EXPECT_EQ(picture.at(kFar, kNear), kGreen);
@@ -165,7 +165,7 @@ TEST_F(RendererTest, EachDrawTakesItsOwnSlotsAndPlace) {
         DrawItem item;
         item.tile = child_of({0, 0, 0}, quadrant);
         item.height_slot = 4 - quadrant;
-        item.texture_slot = quadrant + 1;
+        item.texture.slot = quadrant + 1;
         items.push_back(item);
         renderer_->upload_texture(quadrant + 1,
                                   plain_texture(kTextureLog2, colours[static_cast<std::size_t>(quadrant)]));
@@ -202,9 +202,9 @@ TEST_F(RendererTest, AnAncestorsTextureShowsTheRightQuadrant) {
     for (int quadrant = 0; quadrant < 4; ++quadrant) {
         DrawItem item;
         item.tile = child_of({0, 0, 0}, quadrant);
-        item.texture_scale = 0.5f;
-        item.texture_offset_u = quadrant % 2 == 0 ? 0.0f : 0.5f;
-        item.texture_offset_v = quadrant / 2 == 0 ? 0.0f : 0.5f;
+        item.texture.scale = 0.5f;
+        item.texture.offset_u = quadrant % 2 == 0 ? 0.0f : 0.5f;
+        item.texture.offset_v = quadrant / 2 == 0 ? 0.0f : 0.5f;
         const Picture picture = draw(from_above(386), {item}, bare());
         const int x = quadrant % 2 == 0 ? kNear : kFar, y = quadrant / 2 == 0 ? kNear : kFar;
         EXPECT_EQ(picture.at(x, y), expected[static_cast<std::size_t>(quadrant)]) << "quadrant " << quadrant;
@@ -239,7 +239,7 @@ TEST_F(RendererTest, TilesOfSeveralTextureArraysAreDrawnTogether) {
         renderer_->upload_texture(slots[q], plain_texture(kTextureLog2, colours[q]));
         DrawItem item;
         item.tile = child_of({0, 0, 0}, quadrant);
-        item.texture_slot = slots[q];
+        item.texture.slot = slots[q];
         items.push_back(item);
     }
     const Picture picture = draw(from_above(380), items, bare());
@@ -289,7 +289,7 @@ TEST_F(RendererTest, NearerTilesHideFartherOnes) {
     renderer_->upload_texture(1, plain_texture(kTextureLog2, kRed565));
     DrawItem low, high;
     high.height_slot = 1;
-    high.texture_slot = 1;
+    high.texture.slot = 1;
     // One metre apart, seen from 20 km: more than a 24-bit depth buffer could tell with this near plane.
     auto camera = look_at({1160, 1840, 20'000}, {1160, 1840, 0}, 0.5, kSize_px, kSize_px);
     ASSERT_TRUE(camera.ok());
@@ -370,7 +370,7 @@ TEST_F(RendererTest, ManyFramesInFlightDoNotMixTheirDraws) {
         ASSERT_TRUE(target.ok());
         targets.push_back(std::move(*target));
         DrawItem item;
-        item.texture_slot = frame % 2;
+        item.texture.slot = frame % 2;
         renderer_->draw(from_above(100), std::vector{item}, bare(), targets.back());
     }
     for (std::size_t frame = 0; frame < targets.size(); ++frame) {

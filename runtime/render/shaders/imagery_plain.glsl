@@ -1,0 +1,7 @@
+// Imagery of a draw with one texture; see imagery_blended.glsl for the other kind.
+layout(binding = kImageryTextureUnit) uniform sampler2DArray imagery;
+
+in vec2 texture_position;
+flat in float texture_layer;
+
+vec4 imagery_texel() { return texture(imagery, vec3(texture_position, texture_layer)); }
