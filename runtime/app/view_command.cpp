@@ -5,13 +5,13 @@
 #include <cmath>
 #include <filesystem>
 
+#include "common/query/ground.h"
 #include "common/report.h"
 #include "runtime/app/commands.h"
 #include "runtime/app/display.h"
 #include "runtime/app/fly_controls.h"
 #include "runtime/app/hud.h"
 #include "runtime/app/view_options.h"
-#include "runtime/view/ground.h"
 
 namespace scree {
 namespace {
@@ -72,7 +72,7 @@ Result<void> view(ViewOptions o, double seconds) {
         }
         const FlightPose before = controls.pose();
         auto under = (*ground)->height(before.eye.x, before.eye.y);
-        controls.move(std::min(elapsed, 0.1), under && *under ? **under : -1e9);
+        controls.move(std::min(elapsed, 0.1), under && *under ? (*under)->height_m : -1e9);
         FrameSettings& settings = (*display)->frame_settings();
         const auto toggle = [&](int key, bool& value) {
             const int presses = controls.take_presses(key);

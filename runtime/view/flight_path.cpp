@@ -8,7 +8,7 @@
 #include <fstream>
 #include <numbers>
 
-#include "runtime/view/ground.h"
+#include "common/query/ground.h"
 
 namespace scree {
 namespace {
@@ -21,7 +21,7 @@ double radians(double degrees) { return degrees * std::numbers::pi / 180; }
 Result<double> ground_or_floor(Ground& ground, const Dataset& d, glm::dvec3 p) {
     auto height = ground.height(p.x, p.y);
     if (!height) return height.error();
-    return height->value_or(d.min_height_m);
+    return *height ? (*height)->height_m : d.min_height_m;
 }
 
 constexpr int kKeyPoses = 301;  // a hundred a part: the path does not depend on how many frames are flown along it

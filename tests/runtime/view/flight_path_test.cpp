@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "common/query/ground.h"
 #include "runtime/view/frustum.h"
-#include "runtime/view/ground.h"
 #include "tests/runtime/lod/memory_store.h"
 
 namespace scree {
@@ -117,7 +117,7 @@ TEST(DefaultFlight, IsTheSameEveryTimeAboveGroundAndLowThenHighThenSteep) {
             ASSERT_TRUE(look_at(pose.eye, pose.look, 40, 800, 800).ok());
             const auto height = (*ground)->height(pose.eye.x, pose.eye.y);
             ASSERT_TRUE(height.ok());
-            const double floor = height->value_or(terrain.dataset().min_height_m);
+            const double floor = *height ? (*height)->height_m : terrain.dataset().min_height_m;
             ASSERT_GE(pose.eye.z,
                       floor + (k < 100 ? 3 * terrain.lattice().spacing_m : (k < 200 ? 0.1 : 0.04) * extent) - 1e-9);
             const double pitch = std::asin(glm::normalize(pose.look - pose.eye).z) * 57.29577951308232;

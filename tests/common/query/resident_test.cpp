@@ -1,0 +1,150 @@
+// Queries from whatever tiles are there: what they answer is never farther from the truth than they say.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "common/query/ground.h"
+#include "tests/common/query/small_world.h"
+
+namespace scree {
+namespace {
+
+TEST(PartialTiles, KeepTheTrueHeightWithinTheBound) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    std::int64_t coarse = 0, exact = 0;
+    double closest = 0;
+    for (int w = 0; w < 60; ++w) {
+        const auto world = test::random_world(random);
+        const Lattice& l = world.lattice();
+        const double stated_m = world.dataset().height_quantum_error_m + world.dataset().warp_error_m;
+        auto ground = Ground::open(world);
+        ASSERT_TRUE(ground.ok());
+        test::PartialSource some(world);
+        some.drop(random, test::uniform(random, 0, 100));
+        for (int k = 0; k < 300; ++k) {
+            // Vertices too: there the greatest errors lie.
+            const double fraction = k % 3 == 0 ? 1 : 256;
+            const double i = std::floor(test::uniform_real(random, 0, static_cast<double>(l.cells_x)) * fraction) /
+                             fraction,
+                         j = std::floor(test::uniform_real(random, 0, static_cast<double>(l.cells_y)) * fraction) /
+                             fraction;
+            const auto truth = (*ground)->height(world.x_m(i), world.y_m(j));
+            const auto answer = height_at(some, world.x_m(i), world.y_m(j));
+            ASSERT_TRUE(truth.ok() && answer.ok());
+            if (!*truth) {
+                ASSERT_TRUE(!*answer || (*answer)->level < l.deepest_level) << "the deepest level knows absent cells";
+                continue;
+            }
+            ASSERT_TRUE(answer->has_value());
+            const double off = std::abs((*answer)->height_m - (*truth)->height_m);
+            const double bound = (*answer)->error_bound_m - stated_m;
+            ASSERT_LE(off, bound + 1e-9) << "level " << (*answer)->level;
+            if ((*answer)->level == l.deepest_level) {
+                ++exact;
+                ASSERT_EQ((*answer)->error_bound_m, (*truth)->error_bound_m);
+            } else {
+                ++coarse;
+                if (bound > 0) closest = std::max(closest, off / bound);
+            }
+        }
+    }
+    EXPECT_GT(coarse, 3000);
+    EXPECT_GT(exact, 1000);
+    EXPECT_GT(closest, 0.999) << "the bound is the tile's own error, not a multiple";
+}
+
+TEST(PartialTiles, WithEveryTileAnswerLikeTheGround) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed() + 1);
+    for (int w = 0; w < 20; ++w) {
+        const auto world = test::random_world(random);
+        const Lattice& l = world.lattice();
+        auto ground = Ground::open(world);
+        ASSERT_TRUE(ground.ok());
+        test::PartialSource all(world);
+        for (int k = 0; k < 100; ++k) {
+            const double x = world.x_m(test::uniform_real(random, -1, static_cast<double>(l.cells_x) + 1)),
+                         y = world.y_m(test::uniform_real(random, -1, static_cast<double>(l.cells_y) + 1));
+            const auto truth = (*ground)->height(x, y), answer = height_at(all, x, y);
+            ASSERT_TRUE(truth.ok() && answer.ok());
+            ASSERT_EQ(truth->has_value(), answer->has_value());
+            if (*truth) {
+                ASSERT_EQ((*truth)->height_m, (*answer)->height_m);
+            }
+        }
+    }
+}
+
+// A hit on coarse tiles has the true surface within its bound above or below, steps between levels included; and no ray
+// slips through those steps: going from above all ground to below it over ground throughout, it hits.
+TEST(PartialTiles, StopEveryRayWithinTheBound) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed() + 2);
+    std::int64_t hits = 0, coarse = 0;
+    for (int w = 0; w < 150; ++w) {
+        const auto world = test::random_world(random);
+        const Dataset& d = world.dataset();
+        const Lattice& l = world.lattice();
+        bool whole = true;
+        for (std::int64_t j = 0; j < l.cells_y; ++j)
+            for (std::int64_t i = 0; i < l.cells_x; ++i) whole = whole && world.present(i, j);
+        auto ground = Ground::open(world);
+        ASSERT_TRUE(ground.ok());
+        test::PartialSource some(world);
+        some.drop(random, test::uniform(random, 0, 60));
+        const double stated_m = d.height_quantum_error_m + d.warp_error_m;
+        for (int k = 0; k < 60; ++k) {
+            const auto point = [&](double n) {
+                return Vector3{world.x_m(test::uniform_real(random, 0, static_cast<double>(l.cells_x))),
+                               world.y_m(test::uniform_real(random, 0, static_cast<double>(l.cells_y))), d.height_m(n)};
+            };
+            const bool down = k % 2 == 0;
+            const Vector3 from = point(down ? 600 : -600), to = point(down ? -600 : 600);
+            const Vector3 along{to.x - from.x, to.y - from.y, to.z - from.z};
+            const auto hit = cast_ray(some, from, along, std::hypot(along.x, along.y, along.z));
+            ASSERT_TRUE(hit.ok());
+            if (whole) {
+                ASSERT_TRUE(hit->has_value()) << "world " << w << " ray " << k;
+            }
+            if (!*hit) continue;
+            const auto truth = (*ground)->height((*hit)->position.x, (*hit)->position.y);
+            ASSERT_TRUE(truth.ok());
+            if (!*truth) continue;
+            ++hits;
+            coarse += (*hit)->error_bound_m > stated_m ? 1 : 0;
+            ASSERT_LE(std::abs((*truth)->height_m - (*hit)->position.z), (*hit)->error_bound_m - stated_m + 1e-6)
+                << "world " << w << " ray " << k;
+        }
+    }
+    EXPECT_GT(hits, 3000);
+    EXPECT_GT(coarse, 500);
+}
+
+// One half of the ground drawn by the root, the other by its children: a step of 40 quanta stands between, and a ray
+// that passes through the step alone is stopped by it.
+TEST(PartialTiles, AStepBetweenLevelsIsNoGap) {
+    test::WorldShape shape;
+    shape.cells_x = shape.cells_y = 8;
+    const test::SmallWorld world(shape, [](std::int64_t i, std::int64_t j) { return i == 4 && j % 2 == 1 ? 40 : 0; });
+    class WestOnly final : public HeightSource {
+    public:
+        explicit WestOnly(const test::SmallWorld& terrain) : terrain_(terrain) {}
+        const Dataset& dataset() const override { return terrain_.dataset(); }
+        Result<std::optional<HeightTileView>> view(TileId id) override {
+            if (id.level == 1 && id.x == 1) return std::optional<HeightTileView>{};
+            const HeightTile& tile = terrain_.tiles().at(id);
+            return std::optional<HeightTileView>{HeightTileView{&tile.header, tile.samples, tile.presence}};
+        }
+
+    private:
+        const test::SmallWorld& terrain_;
+    } source(world);
+    const auto hit = cast_ray(source, {6, -3, 20}, {-1, 0, 0}, 10);  // level with the middle of the step
+    ASSERT_TRUE(hit.ok() && hit->has_value());
+    EXPECT_EQ((*hit)->position.x, 4);
+    EXPECT_GE((*hit)->error_bound_m, 20);
+}
+
+}  // namespace
+}  // namespace scree
