@@ -17,8 +17,13 @@ public:
     void u32(std::uint32_t v) {
         for (int k = 0; k < 4; ++k) out_.push_back(static_cast<std::uint8_t>(v >> (8 * k)));
     }
+    void u64(std::uint64_t v) {
+        u32(static_cast<std::uint32_t>(v));
+        u32(static_cast<std::uint32_t>(v >> 32));
+    }
     void i32(std::int32_t v) { u32(static_cast<std::uint32_t>(v)); }
     void f32(float v) { u32(std::bit_cast<std::uint32_t>(v)); }
+    void f64(double v) { u64(std::bit_cast<std::uint64_t>(v)); }
     void bytes(std::span<const std::uint8_t> v) { out_.insert(out_.end(), v.begin(), v.end()); }
 
 private:
@@ -39,8 +44,13 @@ public:
         const std::uint8_t* p = in_.data() + position_ - 4;
         return std::uint32_t{p[0]} | std::uint32_t{p[1]} << 8 | std::uint32_t{p[2]} << 16 | std::uint32_t{p[3]} << 24;
     }
+    std::uint64_t u64() {
+        const std::uint64_t low = u32();
+        return low | std::uint64_t{u32()} << 32;
+    }
     std::int32_t i32() { return static_cast<std::int32_t>(u32()); }
     float f32() { return std::bit_cast<float>(u32()); }
+    double f64() { return std::bit_cast<double>(u64()); }
     std::span<const std::uint8_t> bytes(std::size_t count) {
         return take(count) ? in_.subspan(position_ - count, count) : std::span<const std::uint8_t>{};
     }

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/report.h"
+#include "tools/cli/height_options.h"
 #include "tools/pyramid/builder.h"
 
 namespace scree {
@@ -33,12 +34,7 @@ int run_build(int argc, char** argv) {
     app.add_option("--imagery", images, "Colour image in the same CRS; its extent and resolution may differ")
         ->expected(1, -1);
     app.add_option("-o,--output", options.out, "The store to write")->required();
-    app.add_option("--spacing", options.spacing_m, "Metres between samples of a file without georeference");
-    app.add_option("--height-scale", options.height_scale, "z = value * scale + offset, in metres")
-        ->capture_default_str();
-    app.add_option("--height-offset", options.height_offset_m, "z = value * scale + offset, in metres")
-        ->capture_default_str();
-    app.add_option("--nodata", options.nodata, "A height value that means void, besides the file's own");
+    add_height_options(app, options);
     app.add_option("--tile-size", options.tile_size,
                    "Samples along a height tile, 2^n + 1: larger means fewer, coarser choices")
         ->capture_default_str();

@@ -11,6 +11,7 @@
 #include "tools/cli/build_command.h"
 #include "tools/cli/export_command.h"
 #include "tools/cli/info_command.h"
+#include "tools/cli/samples_command.h"
 #include "tools/cli/synth_command.h"
 #include "tools/verify/verify_command.h"
 
@@ -21,12 +22,13 @@ struct Command {
     int (*run)(int, char**);
 };
 
-constexpr std::array<Command, 5> kCommands{{
+constexpr std::array<Command, 6> kCommands{{
     {"synth", "make a mountain landscape to try things on", scree::run_synth},
     {"build", "cut a DEM and an image into a pyramid", scree::run_build},
     {"info", "say what a store holds", scree::run_info},
     {"verify", "check a store: bounds, edges, checksums, completeness", scree::run_verify},
     {"export", "write part of a store in a common format", scree::run_export},
+    {"samples", "write a DEM's samples raw, to judge a store by", scree::run_samples},
 }};
 
 void print_help() {

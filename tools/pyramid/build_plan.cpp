@@ -17,39 +17,10 @@ namespace {
 
 // Measured on Debian 12: OpenImageIO and the libraries behind it, loaded and idle, with the program and SQLite's cache.
 constexpr std::int64_t kProcessBytes = std::int64_t{150} << 20;
-constexpr double kSquareTolerance = 1e-4;  // relative difference of pixel width and height
-constexpr double kTexelTolerance = 1.1;    // a texel may be this much coarser than a source pixel
+constexpr double kTexelTolerance = 1.1;  // a texel may be this much coarser than a source pixel
 
 Error input_error(std::string message) { return {ErrorCode::input, std::move(message)}; }
 Error usage_error(std::string message) { return {ErrorCode::usage, std::move(message)}; }
-
-Result<void> check_usable(const std::string& path, const Georeference& where) {
-    if (where.geographic)
-        return input_error(
-            fmt::format("{}: coordinates are degrees ({}); heights in degrees cannot be built until warping "
-                        "exists: reproject to a metric CRS such as UTM first",
-                        path, where.crs.empty() ? "geographic CRS" : where.crs));
-    if (where.rotated)
-        return input_error(fmt::format(
-            "{}: the raster is rotated against its CRS; this needs warping, which does not exist yet", path));
-    if (where.step_y > 0 || where.step_x < 0)
-        return input_error(
-            fmt::format("{}: rows do not run from north to south (steps {}, {}); this needs warping, which does "
-                        "not exist yet",
-                        path, where.step_x, where.step_y));
-    if (std::abs(where.linear_unit_m - 1) > 1e-9)
-        return input_error(fmt::format("{}: CRS units of {} m; only metres can be built until warping exists", path,
-                                       where.linear_unit_m));
-    return {};
-}
-
-Result<void> check_square(const std::string& path, const Georeference& where) {
-    if (std::abs(where.step_x + where.step_y) > kSquareTolerance * where.step_x)
-        return input_error(
-            fmt::format("{}: cells of {} x {} m are not square; this needs warping, which does not exist yet", path,
-                        where.step_x, -where.step_y));
-    return {};
-}
 
 Result<int> log2_of(int value, int minimum_log2, int maximum_log2, const char* option, const char* allowed) {
     for (int k = minimum_log2; k <= maximum_log2; ++k)
@@ -58,28 +29,10 @@ Result<int> log2_of(int value, int minimum_log2, int maximum_log2, const char* o
 }
 
 Result<Lattice> plan_lattice(const BuildOptions& o, const ImageSource& dem, int tile_cells_log2) {
-    const ImageInfo& info = dem.info();
-    if (info.width < 2 || info.height < 2)
-        return input_error(
-            fmt::format("{}: {} x {} samples; a terrain needs at least 2 x 2", o.dem, info.width, info.height));
-    if (!dem.georeference()) {
-        const double spacing = o.spacing_m.value_or(0);
-        if (!o.spacing_m)
-            return input_error(
-                fmt::format("{}: the file carries no georeference; give the distance of its samples in metres "
-                            "with --spacing",
-                            o.dem));
-        // Samples are points and the north-west one stands at (0, 0); y falls southward.
-        return make_lattice(0, 0, spacing, info.width - 1, info.height - 1, tile_cells_log2);
-    }
-    const Georeference& where = *dem.georeference();
-    if (o.spacing_m)
-        return usage_error(
-            fmt::format("--spacing {}: {} carries its own georeference ({} m); the option is for files without",
-                        *o.spacing_m, o.dem, where.step_x));
-    if (auto ok = check_usable(o.dem, where); !ok) return ok.error();
-    if (auto ok = check_square(o.dem, where); !ok) return ok.error();
-    return make_lattice(where.first_x, where.first_y, where.step_x, info.width - 1, info.height - 1, tile_cells_log2);
+    const auto place = place_heights(o.dem, dem, o);
+    if (!place) return place.error();
+    return make_lattice(place->x_m, place->y_m, place->step_x_m, dem.info().width - 1, dem.info().height - 1,
+                        tile_cells_log2);
 }
 
 Result<void> plan_imagery(const BuildOptions& o, BuildPlan& plan) {
@@ -101,7 +54,6 @@ Result<void> plan_imagery(const BuildOptions& o, BuildPlan& plan) {
         return {};
     }
     if (auto ok = check_usable(*o.imagery, *where); !ok) return ok;
-    if (auto ok = check_square(*o.imagery, *where); !ok) return ok;
     if (!where->crs.empty() && !dem_where->crs.empty() && where->crs != dem_where->crs)
         return input_error(fmt::format("{} is in {}, {} in {}: both must be in one CRS until warping exists",
                                        *o.imagery, where->crs, o.dem, dem_where->crs));
@@ -167,14 +119,9 @@ Result<BuildPlan> plan_build(const BuildOptions& o) {
     if (o.memory_bytes < kMinMemoryBytes)
         return usage_error(
             fmt::format("--memory {} MiB is below the minimum of {} MiB", o.memory_bytes >> 20, kMinMemoryBytes >> 20));
-    if (!(std::isfinite(o.height_scale) && o.height_scale > 0))
-        return usage_error(fmt::format("--height-scale {} is not a positive number", o.height_scale));
-    if (!(std::abs(o.height_offset_m) <= 1e7))
-        return usage_error(fmt::format("--height-offset {} m is not within 1e7 m", o.height_offset_m));
+    if (auto ok = check_height_reading(o); !ok) return ok.error();
     if (o.height_quantum_m && !(*o.height_quantum_m >= 1e-6 && *o.height_quantum_m <= 1000))
         return usage_error(fmt::format("--height-quantum {} m is outside 1e-6..1000", *o.height_quantum_m));
-    if (o.spacing_m && !(*o.spacing_m >= 1e-6 && *o.spacing_m <= 1e6))
-        return usage_error(fmt::format("--spacing {} m is outside 1e-6..1e6", *o.spacing_m));
     auto tile_log2 = log2_of(o.tile_size - 1, kMinTileCellsLog2, kMaxTileCellsLog2,
                              fmt::format("--tile-size {}", o.tile_size).c_str(), "5, 9, 17, 33, 65, 129, 257");
     if (!tile_log2) return tile_log2.error();
@@ -185,12 +132,9 @@ Result<BuildPlan> plan_build(const BuildOptions& o) {
 
     BuildPlan plan;
     const OpenOptions open_options{o.memory_bytes / 4};
-    auto dem = ImageSource::open(o.dem, open_options);
+    auto dem = open_heights(o.dem, open_options);
     if (!dem) return dem.error();
     plan.dem = std::move(*dem);
-    if (plan.dem->info().channels > 2)
-        return input_error(fmt::format("{}: {} channels; heights are one channel: is this the imagery?", o.dem,
-                                       plan.dem->info().channels));
     auto lattice = plan_lattice(o, *plan.dem, *tile_log2);
     if (!lattice) return Error{lattice.error().code, lattice.error().message};
     Dataset& d = plan.dataset;

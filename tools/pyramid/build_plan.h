@@ -8,21 +8,17 @@
 
 #include "common/dataset.h"
 #include "common/result.h"
-#include "tools/source/image_source.h"
+#include "tools/source/height_source.h"
 
 namespace scree {
 
 inline constexpr std::int64_t kMinMemoryBytes = std::int64_t{192} << 20;
 
-struct BuildOptions {
+struct BuildOptions : HeightReading {
     std::string dem;
     std::optional<std::string> imagery;
     std::string out;
-    std::optional<double> spacing_m;  ///< for files without georeference
-    double height_scale = 1;          ///< z = raw * scale + offset
-    double height_offset_m = 0;
     std::optional<double> height_quantum_m;
-    std::optional<double> nodata;  ///< besides the file's own tag
     int tile_size = 33;
     int texture_size = 256;
     int threads = 0;                                      ///< 0: all cores

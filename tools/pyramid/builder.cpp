@@ -1,9 +1,6 @@
 #include "tools/pyramid/builder.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
-#include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
@@ -22,6 +19,7 @@
 
 #include "common/process_usage.h"
 #include "common/report.h"
+#include "tools/partial_file.h"
 #include "tools/progress.h"
 #include "tools/pyramid/height_pyramid.h"
 #include "tools/pyramid/height_spool.h"
@@ -34,77 +32,12 @@ namespace {
 
 constexpr std::int64_t kSpoolBandRows = 16;
 
-// The file that grows under OUT.partial: locked, so that two builds of one store cannot meet in it, and removed unless
-// it was given its final name.
-class PartialFile {
-public:
-    static Result<std::unique_ptr<PartialFile>> create(const std::string& path) {
-        for (;;) {
-            const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
-            if (fd < 0) return Error{ErrorCode::io, fmt::format("{}: {}", path, std::strerror(errno))};
-            std::unique_ptr<PartialFile> file(new PartialFile(path, fd));
-            if (::flock(fd, LOCK_EX | LOCK_NB) != 0) {
-                file->kept_ = true;
-                return Error{ErrorCode::usage, fmt::format("{}: another build is writing it", path)};
-            }
-            // The file may have been renamed or removed between opening and locking.
-            struct stat held {
-            }, named{};
-            if (::fstat(fd, &held) == 0 && ::stat(path.c_str(), &named) == 0 && held.st_ino == named.st_ino) {
-                if (::ftruncate(fd, 0) != 0)
-                    return Error{ErrorCode::io, fmt::format("{}: {}", path, std::strerror(errno))};
-                return file;
-            }
-            file->kept_ = true;
-        }
-    }
-    ~PartialFile() {
-        if (!kept_) std::remove(path_.c_str());
-        ::close(fd_);
-    }
-    PartialFile(const PartialFile&) = delete;
-    PartialFile& operator=(const PartialFile&) = delete;
-    const std::string& path() const { return path_; }
-
-    Result<void> rename_to(const std::string& final_path) {
-        if (std::rename(path_.c_str(), final_path.c_str()) != 0)
-            return Error{ErrorCode::io,
-                         fmt::format("{}: cannot rename to {}: {}", path_, final_path, std::strerror(errno))};
-        kept_ = true;
-        std::error_code ignored;
-        const std::string folder = std::filesystem::absolute(final_path, ignored).parent_path().string();
-        const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-        if (fd >= 0) {
-            ::fsync(fd);  // makes the new name durable; a file system that cannot is no reason to fail
-            ::close(fd);
-        }
-        return {};
-    }
-
-private:
-    PartialFile(std::string path, int fd) : path_(std::move(path)), fd_(fd) {}
-    std::string path_;
-    int fd_;
-    bool kept_ = false;
-};
-
 Error interrupted() { return {ErrorCode::interrupted, "stopped; nothing was written"}; }
-
-// Voids of a band: the file's nodata value, the user's, and whatever is not finite.
-struct VoidRule {
-    std::optional<double> tag, user;
-    void apply(std::span<double> row) const {
-        for (double& v : row)
-            if (!std::isfinite(v) || (tag && v == *tag) || (user && v == *user))
-                v = std::numeric_limits<double>::quiet_NaN();
-    }
-};
 
 Result<void> spool_heights(BuildPlan& plan, const BuildOptions& options, HeightSpool& spool, Progress& progress,
                            const std::atomic<bool>& stop, double pixels_done) {
     const ImageInfo& info = plan.dem->info();
-    VoidRule voids{info.nodata, options.nodata};
-    if (voids.user && info.type == SampleType::f32) voids.user = static_cast<double>(static_cast<float>(*voids.user));
+    const VoidRule voids(info, options);
     std::vector<double> band(static_cast<std::size_t>(kSpoolBandRows * info.width));
     for (std::int64_t j = 0; j < info.height; j += kSpoolBandRows) {
         if (stop) return interrupted();

@@ -1,0 +1,14 @@
+#include "tools/cli/height_options.h"
+
+namespace scree {
+
+void add_height_options(CLI::App& app, HeightReading& reading) {
+    app.add_option("--spacing", reading.spacing_m, "Metres between samples of a file without georeference");
+    app.add_option("--height-scale", reading.height_scale, "z = value * scale + offset, in metres")
+        ->capture_default_str();
+    app.add_option("--height-offset", reading.height_offset_m, "z = value * scale + offset, in metres")
+        ->capture_default_str();
+    app.add_option("--nodata", reading.nodata, "A height value that means void, besides the file's own");
+}
+
+}  // namespace scree
