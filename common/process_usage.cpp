@@ -1,6 +1,10 @@
 #include "common/process_usage.h"
 
 #include <sys/resource.h>
+#include <unistd.h>
+
+#include <cinttypes>
+#include <cstdio>
 
 namespace scree {
 
@@ -11,6 +15,15 @@ ProcessUsage process_usage() {
         return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
     };
     return {seconds(usage.ru_utime) + seconds(usage.ru_stime), std::int64_t{usage.ru_maxrss} * 1024};
+}
+
+std::int64_t resident_bytes() {
+    std::int64_t total = 0, resident = 0;
+    if (std::FILE* file = std::fopen("/proc/self/statm", "r"); file != nullptr) {
+        if (std::fscanf(file, "%" SCNd64 " %" SCNd64, &total, &resident) != 2) resident = 0;
+        std::fclose(file);
+    }
+    return resident * ::sysconf(_SC_PAGESIZE);
 }
 
 }  // namespace scree

@@ -12,4 +12,7 @@ struct ProcessUsage {
 
 ProcessUsage process_usage();
 
+/// Resident memory of this process now, bytes.
+std::int64_t resident_bytes();
+
 }  // namespace scree

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "common/mesh/geometric_error.h"
 #include "common/store/height_codec.h"
@@ -32,22 +33,35 @@ public:
     explicit Judge(const AuditedFrame& frame)
         : eye_(frame.camera.eye),
           half_curvature_(frame.half_curvature),
+          px_per_m_at_1m_(frame.camera.focal_px() * frame.camera.off_axis_factor()),
           frustum_(frame.camera),
           project_(frame.camera) {}
 
-    /// (u, v): the point's place on the tile, finest cells.
-    void add(glm::dvec3 truth, const DrawnTile& tile, double u, double v, ErrorHistogram& errors) const {
-        const double dx = truth.x - eye_.x, dy = truth.y - eye_.y;
-        truth.z -= (dx * dx + dy * dy) * half_curvature_;
-        if (!frustum_.contains(truth)) return;
+    /// Pixels between a true point and the drawn one; (u, v): its place on the tile, finest cells. Nullopt where either
+    /// is out of view.
+    std::optional<double> error_px(glm::dvec3 truth, const DrawnTile& tile, double u, double v) const {
+        truth = curved(truth);
+        if (!frustum_.contains(truth)) return std::nullopt;
         const glm::dvec3 shown = tile.at(u, v);
-        if (!frustum_.contains(shown + eye_)) return;
-        errors.add(glm::length(project_(truth - eye_) - project_(shown)));
+        if (!frustum_.contains(shown + eye_)) return std::nullopt;
+        return glm::length(project_(truth - eye_) - project_(shown));
     }
+    void add(glm::dvec3 truth, const DrawnTile& tile, double u, double v, ErrorHistogram& errors) const {
+        if (const auto px = error_px(truth, tile, u, v)) errors.add(*px);
+    }
+    /// Pixels that a metre of height at a point is seen as, at most.
+    double px_per_m(glm::dvec3 point) const { return px_per_m_at_1m_ / glm::length(curved(point) - eye_); }
 
 private:
+    glm::dvec3 curved(glm::dvec3 point) const {
+        const double dx = point.x - eye_.x, dy = point.y - eye_.y;
+        point.z -= (dx * dx + dy * dy) * half_curvature_;
+        return point;
+    }
+
     glm::dvec3 eye_;
     double half_curvature_;
+    double px_per_m_at_1m_;
     Frustum frustum_;
     Projector project_;
 };
@@ -117,6 +131,60 @@ Result<void> audit_frame(const TileStore& store, TileReader& reader, const Audit
             }
     }
     return {};
+}
+
+namespace {
+
+// Does the sample belong to a cell of four valid ones? Where it does not, nothing is drawn.
+bool is_drawn(const SourceRaster& source, std::int64_t column, std::int64_t row) {
+    const auto valid = [&](std::int64_t c, std::int64_t r) {
+        return c >= 0 && r >= 0 && c < source.columns && r < source.rows && !std::isnan(source.at(c, r));
+    };
+    for (const int dx : {-1, 1})
+        for (const int dy : {-1, 1})
+            if (valid(column + dx, row) && valid(column, row + dy) && valid(column + dx, row + dy)) return true;
+    return false;
+}
+
+}  // namespace
+
+void audit_against(const Dataset& d, const SourceRaster& source, const AuditedFrame& frame, double stated_m,
+                   ErrorHistogram& errors, double& excess_px) {
+    const Lattice& l = d.lattice;
+    const Judge judge(frame);
+    DrawnTile drawn(
+        l, make_relative_frame(l, d.height_offset_m, d.height_quantum_m, frame.camera.eye, frame.half_curvature));
+    // First sample at or beyond a lattice line, with room for rounding: none is judged twice, none is lost.
+    const auto first_column = [&](std::int64_t i) {
+        const double column = (l.x_m(static_cast<double>(i)) - source.x0) / source.dx;
+        return static_cast<std::int64_t>(
+            std::clamp(std::ceil(column - 1e-6), 0.0, static_cast<double>(source.columns)));
+    };
+    const auto first_row = [&](std::int64_t j) {
+        const double row = (source.y0 - l.y_m(static_cast<double>(j))) / source.dy;
+        return static_cast<std::int64_t>(std::clamp(std::ceil(row - 1e-6), 0.0, static_cast<double>(source.rows)));
+    };
+    for (const DrawItem& item : frame.draws) {
+        drawn.set(item, frame.arena.vertices(item.height_slot));
+        const LatticePoint corner = l.corner(item.tile);
+        const std::int64_t extent = l.tile_extent(item.tile.level);
+        const auto last = static_cast<double>(extent);
+        const std::int64_t east = std::min(corner.i + extent, l.cells_x + 1),
+                           south = std::min(corner.j + extent, l.cells_y + 1);
+        for (std::int64_t row = first_row(corner.j); row < first_row(south); ++row)
+            for (std::int64_t column = first_column(corner.i); column < first_column(east); ++column) {
+                const double height_m = source.at(column, row);
+                if (std::isnan(height_m) || !is_drawn(source, column, row)) continue;
+                const glm::dvec3 truth{source.x0 + static_cast<double>(column) * source.dx,
+                                       source.y0 - static_cast<double>(row) * source.dy, height_m};
+                const double u = std::clamp(l.i_of(truth.x) - static_cast<double>(corner.i), 0.0, last);
+                const double v = std::clamp(l.j_of(truth.y) - static_cast<double>(corner.j), 0.0, last);
+                const auto px = judge.error_px(truth, drawn, u, v);
+                if (!px) continue;
+                errors.add(*px);
+                excess_px = std::max(excess_px, *px - stated_m * judge.px_per_m(truth));
+            }
+    }
 }
 
 }  // namespace scree

@@ -6,57 +6,159 @@
 #include "runtime/app/audit.h"
 #include "runtime/app/commands.h"
 #include "runtime/app/coverage.h"
+#include "runtime/app/source_samples.h"
 #include "runtime/app/view_options.h"
 
 namespace scree {
 namespace {
 
-// Positions and projections are doubles here and floats on screen: what they may differ by (Scree lod, 5.2) at 800 px.
+// Rounding of float positions and of their projections on screen (Scree lod, 5.2), at 800 px.
 constexpr double kRoundingPx = 1e-3;
+/// In motion, the clock that tiles grow by: 30 frames a second.
+constexpr double kFrame_s = 1.0 / 30;
+
+struct AuditOptions {
+    int frames = 12;
+    bool moving = false;
+    std::vector<std::string> against;
+    SamplingOptions sampling;
+};
 
 struct AuditResult {
     ErrorHistogram errors;
     CrackReport cracks;
     double max_bound_px = 0;
-    std::int64_t holes = 0, limited = 0;
+    double worst_share = 0;  ///< greatest true error of a frame over what the frame promised
+    bool kept = true;
+    std::int64_t holes = 0, limited = 0, stand_ins = 0;
     int frames = 0;
+    ErrorHistogram source_errors;
+    double source_excess_px = 0;
 };
 
-Result<AuditResult> audit(const ViewOptions& o, int frames) {
+struct Audit {
+    const ViewOptions& options;
+    const AuditOptions& audit;
+    const SqliteStore& store;
+    Scene& scene;
+    CpuArena& arena;
+    TileReader& reader;
+    const TilePatterns& patterns;
+    const SourceSamples* sources;
+    AuditResult result;
+
+    // What is drawn from one pose: settled, or as a flight would have it by now.
+    Result<SceneFrame> frame_at(const Camera& camera) {
+        if (!audit.moving) return scene.complete({&camera, 1}, [] { return interrupt_flag().load(); });
+        return scene.advance({&camera, 1}, kFrame_s * result.frames);
+    }
+
+    Result<void> look(const Camera& camera) {
+        auto frame = frame_at(camera);
+        if (!frame) return frame.error();
+        const Selection& s = *frame->selection;
+        const DrawList& draws = s.draws[0];
+        const Dataset& d = store.dataset();
+        const AuditedFrame audited{camera, draws, arena, frame->half_curvature};
+        // What was promised: tau, or the stated bound where residency, the budget or the data's depth do not allow it.
+        const double promised_px = std::max(options.tau_px, s.max_bound_px) + kRoundingPx;
+        ErrorHistogram errors;
+        if (auto ok = audit_frame(store, reader, audited, errors); !ok) return ok;
+        result.kept = result.kept && errors.max() <= promised_px;
+        result.worst_share = std::max(result.worst_share, errors.max() / promised_px);
+        result.errors.merge(errors);
+        if (sources != nullptr)
+            for (const SourceRaster& source : sources->rasters()) {
+                double excess_px = 0;
+                audit_against(d, source, audited, d.warp_error_m + d.height_quantum_error_m, result.source_errors,
+                              excess_px);
+                result.kept = result.kept && excess_px <= promised_px;
+                result.source_excess_px = std::max(result.source_excess_px, excess_px);
+            }
+        const CrackReport cracks = count_cracks(d, draws, drawn_mesh(d, patterns, draws, arena));
+        result.cracks.edges += cracks.edges;
+        result.cracks.open_edges += cracks.open_edges;
+        result.cracks.t_junctions += cracks.t_junctions;
+        result.holes += count_holes(d, scene.pager().residency(), camera, draws, frame->half_curvature);
+        result.max_bound_px = std::max(result.max_bound_px, s.max_bound_px);
+        result.limited += s.budget_limited ? 1 : 0;
+        result.stand_ins += frame->stand_ins ? 1 : 0;
+        ++result.frames;
+        return {};
+    }
+};
+
+Result<AuditResult> audit(const ViewOptions& o, const AuditOptions& a) {
     auto store = SqliteStore::open(o.store);
     if (!store) return store.error();
     const Dataset& d = (*store)->dataset();
+    std::optional<SourceSamples> sources;
+    if (!a.against.empty()) {
+        auto samples = sample_sources(a.against, a.sampling);
+        if (!samples) return samples.error();
+        sources = std::move(*samples);
+    }
     SceneOptions options = scene_options(o);
     options.textures = false;  // pages are chosen as with them, but nothing is looked at
     auto scene = Scene::open(**store, options);
     if (!scene) return scene.error();
-    auto path = flight_of(**store, o, frames);
+    auto path = flight_of(**store, o, a.frames);
     if (!path) return path.error();
     CpuArena arena(d, (*scene)->memory().height_slots);
     if (auto ok = (*scene)->start(arena); !ok) return ok.error();
     auto reader = (*store)->open_reader();
     if (!reader) return reader.error();
     const TilePatterns patterns(d.lattice.tile_cells_log2);
-    AuditResult result;
+    Audit audit{o, a, **store, **scene, arena, **reader, patterns, sources ? &*sources : nullptr, {}};
     for (const FlightPose& pose : *path) {
         if (interrupt_flag()) return Error{ErrorCode::interrupted, "stopped"};
         auto camera = camera_of(pose, o);
         if (!camera) return camera.error();
-        auto frame = (*scene)->complete({&*camera, 1}, [] { return interrupt_flag().load(); });
-        if (!frame) return frame.error();
-        const Selection& s = *frame->selection;
-        const DrawList& draws = s.draws[0];
-        if (auto ok = audit_frame(**store, **reader, *camera, draws, arena, result.errors); !ok) return ok.error();
-        const CrackReport cracks = count_cracks(d, draws, drawn_mesh(d, patterns, draws, arena));
-        result.cracks.edges += cracks.edges;
-        result.cracks.open_edges += cracks.open_edges;
-        result.cracks.t_junctions += cracks.t_junctions;
-        result.holes += count_holes(d, (*scene)->pager(), *camera, draws);
-        result.max_bound_px = std::max(result.max_bound_px, s.max_bound_px);
-        result.limited += s.budget_limited ? 1 : 0;
-        ++result.frames;
+        if (auto ok = audit.look(*camera); !ok) return ok.error();
     }
-    return result;
+    AuditResult& r = audit.result;
+    r.kept = r.kept && r.cracks.open_edges == 0 && r.cracks.t_junctions == 0 && r.holes == 0;
+    return std::move(r);
+}
+
+nlohmann::ordered_json report_of(const AuditResult& r, const ViewOptions& o, const AuditOptions& a) {
+    nlohmann::ordered_json report = {{"frames", r.frames},
+                                     {"tau_px", o.tau_px},
+                                     {"max_error_px", r.errors.max()},
+                                     {"p99_error_px", r.errors.quantile(0.99)},
+                                     {"mean_error_px", r.errors.mean()},
+                                     {"max_bound_px", r.max_bound_px},
+                                     {"worst_share_of_promise", r.worst_share},
+                                     {"open_edges", r.cracks.open_edges},
+                                     {"t_junctions", r.cracks.t_junctions},
+                                     {"samples", r.errors.count()},
+                                     {"holes", r.holes},
+                                     {"budget_limited_frames", r.limited},
+                                     {"frames_with_stand_ins", r.stand_ins},
+                                     {"kept", r.kept}};
+    if (!a.against.empty())
+        report["against"] = {{"sources", a.against.size()},
+                             {"samples", r.source_errors.count()},
+                             {"max_error_px", r.source_errors.max()},
+                             {"p99_error_px", r.source_errors.quantile(0.99)},
+                             {"mean_error_px", r.source_errors.mean()},
+                             {"max_error_less_stated_px", r.source_excess_px}};
+    return report;
+}
+
+void print(const AuditResult& r, const ViewOptions& o, const AuditOptions& a) {
+    fmt::print("{} frames, {} samples: error max {:.4f} px, p99 {:.4f}, mean {:.5f}; promised {:.4f} at tau {}\n",
+               r.frames, r.errors.count(), r.errors.max(), r.errors.quantile(0.99), r.errors.mean(), r.max_bound_px,
+               o.tau_px);
+    if (!a.against.empty())
+        fmt::print(
+            "against the sources, {} samples: error max {:.4f} px, p99 {:.4f}, mean {:.5f}; {:.4f} px beyond what the "
+            "store states of its heights\n",
+            r.source_errors.count(), r.source_errors.max(), r.source_errors.quantile(0.99), r.source_errors.mean(),
+            r.source_excess_px);
+    fmt::print("{} open edges, {} T-junctions, {} holes{}: {}\n", r.cracks.open_edges, r.cracks.t_junctions, r.holes,
+               r.limited > 0 ? fmt::format(" ({} frames limited by the budget)", r.limited) : "",
+               r.kept ? "the promise holds" : "THE PROMISE IS BROKEN");
 }
 
 }  // namespace
@@ -65,45 +167,33 @@ int run_audit(int argc, char** argv) {
     CLI::App app{"Measures the drawn surface against the finest data, in pixels, and looks for cracks.",
                  "scree-view audit"};
     ViewOptions o;
-    int frames = 12;
+    AuditOptions a;
     add_view_options(app, o);
     app.add_option("--path", o.path,
                    "CSV of eye_x,eye_y,eye_z,look_x,look_y,look_z; default: a low, a high and a steep part");
-    app.add_option("--frames", frames, "Poses along the path")->capture_default_str()->check(CLI::Range(1, 1000000));
+    app.add_option("--frames", a.frames, "Poses along the path")->capture_default_str()->check(CLI::Range(1, 1000000));
+    app.add_flag(
+        "--moving", a.moving,
+        "Do not wait for tiles: judge each frame as a flight draws it, stand-ins and growing tiles included, by "
+        "the bound it states");
+    auto* against = app.add_option("--against", a.against,
+                                   "Also judge by the DEMs themselves, read by `scree samples`: every sample in view");
+    app.add_option("--spacing", a.sampling.spacing_m, "As for scree build, of sources without georeference")
+        ->needs(against);
+    app.add_option("--height-scale", a.sampling.height_scale, "As for scree build")->needs(against);
+    app.add_option("--height-offset", a.sampling.height_offset_m, "As for scree build")->needs(against);
+    app.add_option("--nodata", a.sampling.nodata, "As for scree build")->needs(against);
     if (const int code = parse_arguments(app, argc, argv); code >= 0) return code;
     if (auto ok = check_view_options(o); !ok) return report_error("scree-view audit", ok.error());
     install_interrupt_handler();
-    auto result = audit(o, frames);
+    a.sampling.stop = &interrupt_flag();
+    auto result = audit(o, a);
     if (!result) return report_error("scree-view audit", result.error());
-    const AuditResult& r = *result;
-    // What was promised: tau, or the stated bound where the budget or the data's own depth did not allow tau.
-    const double promised = std::max(o.tau_px, r.max_bound_px) + kRoundingPx;
-    const bool kept =
-        r.errors.max() <= promised && r.cracks.open_edges == 0 && r.cracks.t_junctions == 0 && r.holes == 0;
-    if (o.json != "-")
-        fmt::print(
-            "{} frames, {} samples: error max {:.4f} px, p99 {:.4f}, mean {:.5f}; promised {:.4f} at tau {}\n"
-            "{} open edges, {} T-junctions, {} holes{}: {}\n",
-            r.frames, r.errors.count(), r.errors.max(), r.errors.quantile(0.99), r.errors.mean(), r.max_bound_px,
-            o.tau_px, r.cracks.open_edges, r.cracks.t_junctions, r.holes,
-            r.limited > 0 ? fmt::format(" ({} frames limited by the budget)", r.limited) : "",
-            kept ? "the promise holds" : "THE PROMISE IS BROKEN");
-    if (!o.json.empty()) {
-        const nlohmann::ordered_json report = {{"frames", r.frames},
-                                               {"tau_px", o.tau_px},
-                                               {"max_error_px", r.errors.max()},
-                                               {"p99_error_px", r.errors.quantile(0.99)},
-                                               {"mean_error_px", r.errors.mean()},
-                                               {"max_bound_px", r.max_bound_px},
-                                               {"open_edges", r.cracks.open_edges},
-                                               {"t_junctions", r.cracks.t_junctions},
-                                               {"samples", r.errors.count()},
-                                               {"holes", r.holes},
-                                               {"budget_limited_frames", r.limited}};
-        if (auto ok = write_text(o.json, report.dump(2) + "\n"); !ok)
+    if (o.json != "-") print(*result, o, a);
+    if (!o.json.empty())
+        if (auto ok = write_text(o.json, report_of(*result, o, a).dump(2) + "\n"); !ok)
             return report_error("scree-view audit", ok.error());
-    }
-    return kept ? 0 : static_cast<int>(ErrorCode::check_failed);
+    return result->kept ? 0 : static_cast<int>(ErrorCode::check_failed);
 }
 
 }  // namespace scree

@@ -33,6 +33,9 @@ Result<std::unique_ptr<Display>> Display::create(const Scene& scene, const Displ
     if (!renderer) return renderer.error();
     display->renderer_ = std::move(*renderer);
     display->samples_ = o.samples;
+    display->arena_bytes_ = renderer_bytes(options);
+    display->max_draws_ = options.max_draws;
+    display->tile_cells_log2_ = d.lattice.tile_cells_log2;
     if (auto ok = display->resize(o.width_px, o.height_px); !ok) return ok.error();
     if (o.keep_heights) display->arena_ = std::make_unique<CpuArena>(d, scene.memory().height_slots);
     display->settings_ = scenery(d);
@@ -55,8 +58,30 @@ Result<void> Display::resize(int width_px, int height_px) {
     return {};
 }
 
-FrameTimes Display::draw(const Camera& camera, const DrawList& draws) {
+Result<void> Display::resize_inset(int width_px, int height_px) {
+    auto target = RenderTarget::create({width_px, height_px, samples_});
+    if (!target) return target.error();
+    inset_ = std::make_unique<RenderTarget>(std::move(*target));
+    return {};
+}
+
+FrameTimes Display::draw_inset(const Camera& camera, const DrawList& draws, double half_curvature) {
+    settings_.half_curvature = half_curvature;
+    return renderer_->draw(camera, draws, settings_, *inset_);
+}
+
+FrameTimes Display::draw(const Camera& camera, const DrawList& draws, double half_curvature) {
+    settings_.half_curvature = half_curvature;
     return renderer_->draw(camera, draws, settings_, *target_);
+}
+
+void Display::warm_up(const Camera& camera, const DrawItem& tile, std::int64_t triangles) {
+    DrawItem whole = tile;
+    whole.geomip = 0;
+    whole.edge_mask = 0;
+    const auto each = static_cast<std::int64_t>(pattern_triangles(tile_cells_log2_, 0, 0));
+    const std::int64_t count = std::clamp<std::int64_t>(triangles / each, 1, max_draws_);
+    draw(camera, DrawList(static_cast<std::size_t>(count), whole), 0);
 }
 
 }  // namespace scree

@@ -31,19 +31,30 @@ public:
     GlContext& context() { return *context_; }
     Renderer& renderer() { return *renderer_; }
     RenderTarget& target() { return *target_; }
+    /// Of tile memory, as taken by OpenGL.
+    std::size_t arena_bytes() const { return arena_bytes_; }
     const CpuArena* arena() const { return arena_.get(); }
     FrameSettings& frame_settings() { return settings_; }
     Result<void> resize(int width_px, int height_px);
-    FrameTimes draw(const Camera& camera, const DrawList& draws);
+    /// A second picture of the same tiles, in a target of its own.
+    RenderTarget& inset() { return *inset_; }
+    Result<void> resize_inset(int width_px, int height_px);
+    FrameTimes draw_inset(const Camera& camera, const DrawList& draws, double half_curvature);
+    FrameTimes draw(const Camera& camera, const DrawList& draws, double half_curvature);
+    /// Draws about so many triangles without a purpose, so that what OpenGL takes once is taken.
+    void warm_up(const Camera& camera, const DrawItem& tile, std::int64_t triangles);
 
 private:
     Display() = default;
     std::unique_ptr<GlContext> context_;  // goes last
     std::unique_ptr<Renderer> renderer_;
-    std::unique_ptr<RenderTarget> target_;
+    std::unique_ptr<RenderTarget> target_, inset_;
     std::unique_ptr<CpuArena> arena_;
     FrameSettings settings_;
     int samples_ = 0;
+    std::size_t arena_bytes_ = 0;
+    int max_draws_ = 1;
+    int tile_cells_log2_ = 1;
 };
 
 /// Haze, sun and ground plane that suit a dataset's size.

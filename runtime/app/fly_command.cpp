@@ -2,12 +2,16 @@
 
 #include <chrono>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "common/process_usage.h"
+#include "common/query/ground.h"
 #include "common/report.h"
 #include "runtime/app/commands.h"
 #include "runtime/app/coverage.h"
 #include "runtime/app/display.h"
+#include "runtime/app/frame_governor.h"
+#include "runtime/app/see_through.h"
 #include "runtime/app/statistics.h"
 #include "runtime/app/view_options.h"
 #include "runtime/render/png.h"
@@ -21,21 +25,37 @@ double milliseconds_since(Clock::time_point start) {
     return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
+/// Drawn before the flight, so that what OpenGL takes once for many triangles is not charged to the tiles.
+constexpr std::int64_t kWarmUpTriangles = 600'000;
+/// Longest that the first picture is waited for.
+constexpr double kCatchUp_s = 0.08;
+/// The coarse picture of a cold start.
+constexpr double kColdStartPx = 8;
+
 struct FlyOptions {
     int frames = 300;
+    double step_m = 0;
+    std::optional<std::uint64_t> roam;
     bool wait = false;
     bool headless = false;
+    bool settled = false;
+    bool see_through = false;
     int latency_ms = 0;
+    double fps = 0;
+    double tau_most_px = 16;
     std::string csv;
     std::string last_frame;
 };
 
 struct FlightLog {
-    Series frame_ms, select_ms, triangles, tiles;
-    std::int64_t stand_ins = 0, holes = 0, limited = 0;
-    double max_bound_px = 0;
+    Series frame_ms, select_ms, triangles, tiles, tau, bound, mean_bound;
+    Series settled_triangles, settled_mean_bound;  // of the same poses, when nothing is missing
+    std::int64_t stand_ins = 0, holes = 0, limited = 0, see_through = 0;
+    double coarse_after_ms = 0, true_after_ms = 0;  // from the context on; 0: never
+    std::int64_t fixed_rss_bytes = 0;
     std::string csv =
-        "frame,frame_ms,select_ms,triangles,tiles_drawn,uploads,requests,stand_ins,holes,max_bound_px,rss_bytes\n";
+        "frame,frame_ms,select_ms,triangles,tiles_drawn,uploads,requests,stand_ins,holes,max_bound_px,mean_bound_px,"
+        "tau_effective_px,rss_bytes\n";
 
     void add(int k, double ms, const SceneFrame& frame, std::int64_t frame_holes) {
         const Selection& s = *frame.selection;
@@ -43,66 +63,206 @@ struct FlightLog {
         select_ms.add(frame.select_ms);
         triangles.add(static_cast<double>(s.triangles));
         tiles.add(static_cast<double>(s.nodes));
+        tau.add(s.tau_effective_px);
+        bound.add(s.max_bound_px);
+        mean_bound.add(s.mean_bound_px);
         stand_ins += frame.stand_ins ? 1 : 0;
         limited += s.budget_limited ? 1 : 0;
         holes += frame_holes;
-        max_bound_px = std::max(max_bound_px, s.max_bound_px);
-        csv += fmt::format("{},{:.3f},{:.4f},{},{},{},{},{},{},{:.4f},{}\n", k, ms, frame.select_ms, s.triangles,
-                           s.nodes, frame.uploads, s.requests.size(), frame.stand_ins ? 1 : 0, frame_holes,
-                           s.max_bound_px, process_usage().peak_rss_bytes);
+        csv += fmt::format("{},{:.3f},{:.4f},{},{},{},{},{},{},{:.4f},{:.4f},{:.4f},{}\n", k, ms, frame.select_ms,
+                           s.triangles, s.nodes, frame.uploads, s.requests.size(), frame.stand_ins ? 1 : 0, frame_holes,
+                           s.max_bound_px, s.mean_bound_px, s.tau_effective_px, resident_bytes());
+    }
+    // Least share of the settled triangles that was drawn while flying; 1 without a settled flight.
+    double least_triangle_share() const {
+        double least = 1;
+        for (std::size_t k = 0; k < settled_triangles.values.size(); ++k)
+            if (settled_triangles.values[k] > 0)
+                least = std::min(least, triangles.values[k] / settled_triangles.values[k]);
+        return least;
     }
 };
 
-Result<FlightLog> fly(Scene& scene, Display& display, const FlightPath& path, const ViewOptions& o,
-                      const FlyOptions& f) {
-    FlightLog log;
-    for (std::size_t k = 0; k < path.size(); ++k) {
-        if (interrupt_flag()) return Error{ErrorCode::interrupted, "stopped"};
-        auto camera = camera_of(path[k], o);
-        if (!camera) return camera.error();
-        const auto start = Clock::now();
-        SceneFrame frame;
-        if (f.wait) {
-            auto complete = scene.complete({&*camera, 1}, [] { return interrupt_flag().load(); });
-            if (!complete) return complete.error();
-            frame = *complete;
-        } else {
-            frame = scene.advance({&*camera, 1});
+class Flight {
+public:
+    Flight(Scene& scene, Display& display, Ground& ground, const ViewOptions& o, const FlyOptions& f,
+           Clock::time_point context_at)
+        : scene_(scene), display_(display), ground_(ground), options_(o), fly_(f), context_at_(context_at) {}
+
+    Result<FlightLog> fly(const FlightPath& path) {
+        if (auto ok = warm_up(path); !ok) return ok.error();
+        FrameGovernor governor({fly_.fps > 0 ? 1000 / fly_.fps : 1e9, options_.tau_px, fly_.tau_most_px});
+        start_ = Clock::now();
+        for (std::size_t k = 0; k < path.size(); ++k) {
+            if (interrupt_flag()) return Error{ErrorCode::interrupted, "stopped"};
+            auto camera = camera_of(path[k], options_);
+            if (!camera) return camera.error();
+            auto ms = frame(static_cast<int>(k), *camera);
+            if (!ms) return ms.error();
+            if (fly_.fps > 0) scene_.options().tau_px = governor.next(*ms);
         }
-        display.draw(*camera, frame.selection->to_render(0));
-        if (display.context().window() != nullptr) {
-            display.target().blit_to_window(o.width_px, o.height_px);
-            display.context().swap_buffers();
+        scene_.options().tau_px = options_.tau_px;
+        if (fly_.settled)
+            if (auto ok = settle(path); !ok) return ok.error();
+        return std::move(log_);
+    }
+
+private:
+    Result<void> warm_up(const FlightPath& path) {
+        auto camera = camera_of(path[0], options_);
+        if (!camera) return camera.error();
+        const auto& roots = scene_.pager().residency().heights.roots;
+        DrawItem root;
+        const auto first = std::find_if(roots.begin(), roots.end(), [](std::int32_t slot) { return slot >= 0; });
+        root.tile = {0, (first - roots.begin()) % scene_.dataset().lattice.root_columns,
+                     (first - roots.begin()) / scene_.dataset().lattice.root_columns};
+        root.height_slot = *first;
+        root.texture.slot = scene_.pager().residency().textures.roots[static_cast<std::size_t>(first - roots.begin())];
+        display_.warm_up(*camera, root, kWarmUpTriangles);
+        log_.fixed_rss_bytes = resident_bytes() - static_cast<std::int64_t>(display_.arena_bytes());
+        return {};
+    }
+
+    Result<SceneFrame> think(int k, const Camera& camera) {
+        const double now_s = std::chrono::duration<double>(Clock::now() - start_).count();
+        if (fly_.wait) return scene_.complete({&camera, 1}, [] { return interrupt_flag().load(); });
+        return k == 0 ? scene_.catch_up({&camera, 1}, now_s, kCatchUp_s) : scene_.advance({&camera, 1}, now_s);
+    }
+
+    Result<double> frame(int k, const Camera& camera) {
+        const auto start = Clock::now();
+        auto frame = think(k, camera);
+        if (!frame) return frame.error();
+        const Selection& s = *frame->selection;
+        display_.draw(camera, s.to_render(0), frame->half_curvature);
+        if (display_.context().window() != nullptr) {
+            display_.target().blit_to_window(options_.width_px, options_.height_px);
+            display_.context().swap_buffers();
         }
         const double ms = milliseconds_since(start);
-        log.add(static_cast<int>(k), ms, frame,
-                count_holes(scene.dataset(), scene.pager(), *camera, frame.selection->draws[0]));
+        const double since_context = milliseconds_since(context_at_);
+        if (log_.coarse_after_ms == 0 && s.max_bound_px <= kColdStartPx) log_.coarse_after_ms = since_context;
+        if (log_.true_after_ms == 0 && s.max_bound_px <= options_.tau_px * (1 + 1e-9))
+            log_.true_after_ms = since_context;
+        log_.add(k, ms, *frame,
+                 count_holes(scene_.dataset(), scene_.pager().residency(), camera, s.draws[0], frame->half_curvature));
+        if (fly_.see_through)
+            if (auto ok = look_through(camera, *frame); !ok) return ok.error();
+        return ms;
     }
-    return log;
+
+    Result<void> look_through(const Camera& camera, const SceneFrame& frame) {
+        FrameSettings& settings = display_.frame_settings();
+        settings.magenta_background = true;
+        display_.draw(camera, frame.selection->to_render(0), frame.half_curvature);
+        settings.magenta_background = false;
+        auto count = count_see_through(ground_, camera, frame.half_curvature, frame.selection->max_bound_px + 1,
+                                       display_.target().read_pixels());
+        if (!count) return count.error();
+        log_.see_through += *count;
+        return {};
+    }
+
+    // The same poses once more with all that they want, not drawn: what the flight is measured by.
+    Result<void> settle(const FlightPath& path) {
+        for (const FlightPose& pose : path) {
+            auto camera = camera_of(pose, options_);
+            if (!camera) return camera.error();
+            auto frame = scene_.complete({&*camera, 1}, [] { return interrupt_flag().load(); });
+            if (!frame) return frame.error();
+            log_.settled_triangles.add(static_cast<double>(frame->selection->triangles));
+            log_.settled_mean_bound.add(frame->selection->mean_bound_px);
+        }
+        return {};
+    }
+
+    Scene& scene_;
+    Display& display_;
+    Ground& ground_;
+    const ViewOptions& options_;
+    const FlyOptions& fly_;
+    Clock::time_point context_at_, start_;
+    FlightLog log_;
+};
+
+nlohmann::ordered_json loader_report(const LoaderCounters& c) {
+    const double tiles = static_cast<double>(std::max<std::int64_t>(c.tiles, 1));
+    return {{"tiles", c.tiles},
+            {"cpu_us_per_tile", 1e6 * c.cpu_seconds / tiles},
+            {"latency_ms_mean", 1e3 * c.latency_seconds / tiles}};
 }
 
-nlohmann::ordered_json report_of(const FlightLog& log, const Scene& scene, const ViewOptions& o,
+nlohmann::ordered_json report_of(const FlightLog& log, const Scene& scene, const ViewOptions& o, const FlyOptions& f,
                                  const std::string& renderer) {
     const PagerCounters& c = scene.pager().counters();
-    return {{"frames", log.frame_ms.values.size()},
-            {"frame_ms", log.frame_ms.spread()},
-            {"select_ms", log.select_ms.spread()},
-            {"triangles", log.triangles.mean_max()},
-            {"tiles_drawn", log.tiles.mean_max()},
-            {"budget_bytes", o.budget_bytes},
-            {"peak_resident_bytes", scene.memory().resident_bytes},
-            {"peak_rss_bytes", process_usage().peak_rss_bytes},
-            {"tiles_paged_in", c.tiles_paged_in},
-            {"tiles_paged_out", c.tiles_paged_out},
-            {"bytes_read", c.bytes_read},
-            {"frames_with_stand_ins", log.stand_ins},
-            {"budget_limited_frames", log.limited},
-            {"holes", log.holes},
-            {"max_bound_px", log.max_bound_px},
-            {"damaged_tiles", c.damaged_tiles},
-            {"tau_px", o.tau_px},
-            {"size_px", {o.width_px, o.height_px}},
-            {"renderer", renderer}};
+    const std::int64_t peak = process_usage().peak_rss_bytes;
+    nlohmann::ordered_json report = {
+        {"frames", log.frame_ms.values.size()},
+        {"frame_ms", log.frame_ms.spread()},
+        {"select_ms", log.select_ms.spread()},
+        {"triangles", log.triangles.mean_max()},
+        {"tiles_drawn", log.tiles.mean_max()},
+        {"budget_bytes", o.budget_bytes},
+        {"peak_resident_bytes", scene.memory().resident_bytes},
+        {"peak_rss_bytes", peak},
+        {"fixed_rss_bytes", log.fixed_rss_bytes},
+        {"tile_rss_bytes", peak - log.fixed_rss_bytes},
+        {"tiles_paged_in", c.tiles_paged_in},
+        {"tiles_paged_out", c.tiles_paged_out},
+        {"tiles_prefetched", c.prefetched},
+        {"requests_refused", c.refused},
+        {"bytes_read", c.bytes_read},
+        {"heights_loaded", loader_report(scene.pager().loader_counters(TileKind::height))},
+        {"textures_loaded", loader_report(scene.pager().loader_counters(TileKind::texture))},
+        {"frames_with_stand_ins", log.stand_ins},
+        {"budget_limited_frames", log.limited},
+        {"holes", log.holes},
+        {"max_bound_px", log.bound.max()},
+        {"error_integral_px", log.mean_bound.mean()},
+        {"tau_effective_px", log.tau.mean_max()},
+        {"cold_start_ms", {{"within_8_px", log.coarse_after_ms}, {"within_tau", log.true_after_ms}}},
+        {"damaged_tiles", c.damaged_tiles},
+        {"tau_px", o.tau_px},
+        {"size_px", {o.width_px, o.height_px}},
+        {"renderer", renderer}};
+    if (f.settled) {
+        const double settled = log.settled_mean_bound.mean();
+        report["settled"] = {{"error_integral_px", settled},
+                             {"error_integral_ratio", settled > 0 ? log.mean_bound.mean() / settled : 1},
+                             {"triangles", log.settled_triangles.mean_max()},
+                             {"least_triangle_share", log.least_triangle_share()}};
+    }
+    if (f.see_through) report["see_through_pixels"] = log.see_through;
+    return report;
+}
+
+void print(const FlightLog& log, const Scene& scene, const ViewOptions& o, const FlyOptions& f,
+           const std::string& renderer) {
+    const PagerCounters& c = scene.pager().counters();
+    fmt::print(
+        "{} frames on {}: median {:.1f} ms, p99 {:.1f} ms; selection median {:.3f} ms; {:.0f} triangles in {:.0f} "
+        "tiles (mean)\n"
+        "promised within {:.3g} px; {} frames with stand-ins, {} holes; {:.1f} of {:.1f} MB for tiles, {} tiles in, {} "
+        "out{}\n",
+        log.frame_ms.values.size(), renderer, log.frame_ms.quantile(0.5), log.frame_ms.quantile(0.99),
+        log.select_ms.quantile(0.5), log.triangles.mean(), log.tiles.mean(), log.bound.max(), log.stand_ins, log.holes,
+        static_cast<double>(scene.memory().resident_bytes) / 1e6, static_cast<double>(o.budget_bytes) / 1e6,
+        c.tiles_paged_in, c.tiles_paged_out, c.damaged_tiles > 0 ? fmt::format(", {} damaged", c.damaged_tiles) : "");
+    if (log.limited > 0)
+        fmt::print("the budget bound in {} frames: tau {:.2f} px at most\n", log.limited, log.tau.max());
+    if (f.settled)
+        fmt::print(
+            "error over the flight {:.4f} px (mean promise), settled {:.4f}; at least {:.0f} % of the triangles\n",
+            log.mean_bound.mean(), log.settled_mean_bound.mean(), 100 * log.least_triangle_share());
+    if (f.see_through) fmt::print("{} see-through pixels\n", log.see_through);
+}
+
+Result<FlightPath> path_of(const TileStore& store, const ViewOptions& o, const FlyOptions& f) {
+    if (f.roam) return roaming_flight(store, f.frames, *f.roam);
+    if (!(f.step_m > 0)) return flight_of(store, o, f.frames);
+    auto path = flight_of(store, o, 0);
+    if (!path) return path;
+    return paced(*path, f.step_m, f.frames);
 }
 
 Result<void> run(const ViewOptions& o, const FlyOptions& f) {
@@ -112,35 +272,28 @@ Result<void> run(const ViewOptions& o, const FlyOptions& f) {
     options.latency_ms = f.latency_ms;
     auto scene = Scene::open(**store, options);
     if (!scene) return scene.error();
-    auto path = flight_of(**store, o, f.frames);
+    auto path = path_of(**store, o, f);
     if (!path) return path.error();
+    auto ground = Ground::open(**store);
+    if (!ground) return ground.error();
     DisplayOptions display_options{o.width_px, o.height_px};
     display_options.window = !f.headless;
+    const auto context_at = Clock::now();
     auto display = Display::create(**scene, display_options);
     if (!display) return display.error();
     (*display)->frame_settings().wait_until_drawn = true;
     if (auto ok = (*scene)->start(**display); !ok) return ok;
-    auto log = fly(**scene, **display, *path, o, f);
+    auto log = Flight(**scene, **display, **ground, o, f, context_at).fly(*path);
     if (!log) return log.error();
     if (!f.csv.empty())
         if (auto ok = write_text(f.csv, log->csv); !ok) return ok;
     if (!f.last_frame.empty())
         if (auto ok = write_png(f.last_frame, o.width_px, o.height_px, (*display)->target().read_pixels()); !ok)
             return ok;
-    const auto report = report_of(*log, **scene, o, (*display)->context().renderer());
-    if (o.json != "-")
-        fmt::print(
-            "{} frames on {}: median {:.1f} ms, p99 {:.1f} ms; selection median {:.3f} ms; {:.0f} triangles in {:.0f} "
-            "tiles (mean)\n"
-            "promised within {:.3g} px; {} frames with stand-ins, {} holes; {:.1f} of {:.1f} MB for tiles, {} tiles "
-            "in, {} out\n",
-            log->frame_ms.values.size(), (*display)->context().renderer(), log->frame_ms.quantile(0.5),
-            log->frame_ms.quantile(0.99), log->select_ms.quantile(0.5), log->triangles.mean(), log->tiles.mean(),
-            log->max_bound_px, log->stand_ins, log->holes, static_cast<double>((*scene)->memory().resident_bytes) / 1e6,
-            static_cast<double>(o.budget_bytes) / 1e6, (*scene)->pager().counters().tiles_paged_in,
-            (*scene)->pager().counters().tiles_paged_out);
-    if (o.json.empty()) return {};
-    return write_text(o.json, report.dump(2) + "\n");
+    const std::string renderer = (*display)->context().renderer();
+    if (o.json != "-") print(*log, **scene, o, f, renderer);
+    return o.json.empty() ? Result<void>{}
+                          : write_text(o.json, report_of(*log, **scene, o, f, renderer).dump(2) + "\n");
 }
 
 }  // namespace
@@ -150,15 +303,26 @@ int run_fly(int argc, char** argv) {
     ViewOptions o;
     FlyOptions f;
     add_view_options(app, o);
-    app.add_option("--path", o.path,
-                   "CSV of eye_x,eye_y,eye_z,look_x,look_y,look_z; default: a low, a high and a steep part");
+    auto* path = app.add_option(
+        "--path", o.path, "CSV of eye_x,eye_y,eye_z,look_x,look_y,look_z; default: a low, a high and a steep part");
+    app.add_option("--roam", f.roam, "Instead: a restless flight with leaps, the same for the same number")
+        ->excludes(path);
     app.add_option("--frames", f.frames, "Poses along the path")->capture_default_str()->check(CLI::Range(1, 10000000));
+    app.add_option("--step", f.step_m, "Metres between poses, there and back as often as needed; 0: the path once")
+        ->check(CLI::NonNegativeNumber);
     app.add_flag("--wait", f.wait, "Complete every frame before the next: reproducible");
     app.add_flag("--headless", f.headless, "Without a window");
-    app.add_option("--csv", f.csv, "Write one line a frame");
-    app.add_option("--last-frame", f.last_frame, "Write the last frame as PNG");
+    app.add_option("--fps", f.fps, "Raise the tolerance as far as this many frames a second need, and no further")
+        ->check(CLI::Range(0.1, 1000.0));
+    app.add_option("--tau-max", f.tau_most_px, "With --fps: never coarser than this")->capture_default_str();
+    app.add_flag("--settled", f.settled,
+                 "Afterwards compare with the same poses complete: error over the flight, triangles");
+    app.add_flag("--see-through", f.see_through,
+                 "Draw each frame again over magenta and count pixels that show it where there is ground");
     app.add_option("--latency", f.latency_ms, "Delay every read by so many ms, to try a slow disk")
         ->check(CLI::Range(0, 60000));
+    app.add_option("--csv", f.csv, "Write one line a frame");
+    app.add_option("--last-frame", f.last_frame, "Write the last frame as PNG");
     if (const int code = parse_arguments(app, argc, argv); code >= 0) return code;
     if (auto ok = check_view_options(o); !ok) return report_error("scree-view fly", ok.error());
     install_interrupt_handler();

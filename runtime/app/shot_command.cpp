@@ -45,13 +45,13 @@ Result<void> shoot(const ViewOptions& o, const std::optional<FlightPose>& asked,
     auto frame = (*scene)->complete({&*camera, 1}, [] { return interrupt_flag().load(); });
     if (!frame) return frame.error();
     const Selection& selection = *frame->selection;
-    (*display)->draw(*camera, selection.to_render(0));
+    (*display)->draw(*camera, selection.to_render(0), frame->half_curvature);
     const auto pixels = (*display)->target().read_pixels();
     if (auto ok = write_png(out, o.width_px, o.height_px, pixels); !ok) return ok;
     if (!mesh_file.empty()) {
         const TilePatterns patterns(d.lattice.tile_cells_log2);
-        if (auto ok = write_ply(mesh_file, d, drawn_mesh(d, patterns, selection.draws[0], *(*display)->arena())); !ok)
-            return ok;
+        const DrawnMesh mesh = drawn_mesh(d, patterns, selection.draws[0], *(*display)->arena());
+        if (auto ok = write_ply(mesh_file, d, mesh, camera->eye, frame->half_curvature); !ok) return ok;
     }
     if (o.json != "-")
         fmt::print("{}: {} triangles in {} tiles, at most {:.3g} px from the finest surface{}\n", out,
@@ -62,6 +62,8 @@ Result<void> shoot(const ViewOptions& o, const std::optional<FlightPose>& asked,
                                            {"tiles_drawn", selection.nodes},
                                            {"max_bound_px", selection.max_bound_px},
                                            {"budget_limited", selection.budget_limited},
+                                           {"tau_effective_px", selection.tau_effective_px},
+                                           {"curvature", frame->half_curvature > 0},
                                            {"eye", {pose.eye.x, pose.eye.y, pose.eye.z}},
                                            {"look", {pose.look.x, pose.look.y, pose.look.z}}};
     return write_text(o.json, report.dump(2) + "\n");

@@ -10,6 +10,7 @@
 #include "runtime/app/commands.h"
 #include "runtime/app/display.h"
 #include "runtime/app/fly_controls.h"
+#include "runtime/app/frame_governor.h"
 #include "runtime/app/hud.h"
 #include "runtime/app/view_options.h"
 
@@ -25,14 +26,32 @@ HudLines status_lines(const Scene& scene, const SceneFrame& frame, const FlightP
     lines.body = fmt::format(
         "within {:.2f} px{}{}\neye {:.0f}, {:.0f}, {:.0f} m   {:.0f} m/s\n\nW A S D Q E fly, drag to look, wheel: "
         "speed, Shift: faster\n"
-        "[ ] accuracy   F wireframe   L levels   H hide   Home   Esc",
+        "[ ] accuracy   F wireframe   L levels   V second view   H hide   Home   Esc",
         s.max_bound_px, frame.stand_ins ? fmt::format(", loading {}", s.requests.size()) : "",
-        s.budget_limited ? ", limited by the budget" : "", pose.eye.x, pose.eye.y, pose.eye.z, speed);
+        s.budget_limited ? fmt::format(", the budget allows {:.1f} px", s.tau_effective_px) : "", pose.eye.x,
+        pose.eye.y, pose.eye.z, speed);
     lines.credit = scene.dataset().attribution;
     return lines;
 }
 
-Result<void> view(ViewOptions o, double seconds) {
+/// Of the window's height and width.
+constexpr double kInsetShare = 0.35;
+/// Longest that the first picture is waited for.
+constexpr double kCatchUp_s = 0.08;
+
+// Straight down on the eye's surroundings, north up.
+Result<Camera> view_from_above(const Camera& main, double extent_m, double ground_m, int width_px, int height_px) {
+    const double above_m = std::clamp(6 * (main.eye.z - ground_m), 0.02 * extent_m, extent_m);
+    return look_at(main.eye + glm::dvec3(0, 0, above_m), main.eye, 40, width_px, height_px);
+}
+
+struct WindowSettings {
+    double seconds = 0;
+    double fps = 0;
+    double tau_most_px = 16;
+};
+
+Result<void> view(ViewOptions o, const WindowSettings& w) {
     auto store = SqliteStore::open(o.store);
     if (!store) return store.error();
     auto scene = Scene::open(**store, scene_options(o));
@@ -51,7 +70,10 @@ Result<void> view(ViewOptions o, double seconds) {
     const double extent = static_cast<double>(std::max(d.lattice.cells_x, d.lattice.cells_y)) * d.lattice.spacing_m;
     FlyControls controls(window, overview(d, o.fov_deg, static_cast<double>(o.width_px) / o.height_px), extent);
     Hud hud(window);
-    bool show_hud = true, redraw = true;
+    bool show_hud = true, redraw = true, second_view = false, first = true;
+    FrameGovernor governor({w.fps > 0 ? 1000 / w.fps : 1e9, o.tau_px, w.tau_most_px});
+    double wanted_tau_px = o.tau_px;
+    std::pair<int, int> second_size;
     double mean_frame_s = 0;  // over frames that were drawn
     const auto start = Clock::now();
     auto last = start;
@@ -59,7 +81,8 @@ Result<void> view(ViewOptions o, double seconds) {
         const auto now = Clock::now();
         const double elapsed = std::chrono::duration<double>(now - last).count();
         last = now;
-        if (seconds > 0 && std::chrono::duration<double>(now - start).count() > seconds) break;
+        const double now_s = std::chrono::duration<double>(now - start).count();
+        if (w.seconds > 0 && now_s > w.seconds) break;
         if (controls.take_presses(GLFW_KEY_ESCAPE) > 0) break;
 
         int width = 0, height = 0;
@@ -68,11 +91,13 @@ Result<void> view(ViewOptions o, double seconds) {
             o.width_px = std::min(width, 16384);
             o.height_px = std::min(height, 16384);
             if (auto ok = (*display)->resize(o.width_px, o.height_px); !ok) return ok;
+            second_size = {};
             redraw = true;
         }
         const FlightPose before = controls.pose();
         auto under = (*ground)->height(before.eye.x, before.eye.y);
-        controls.move(std::min(elapsed, 0.1), under && *under ? (*under)->height_m : -1e9);
+        const double ground_m = under && *under ? (*under)->height_m : -1e9;
+        controls.move(std::min(elapsed, 0.1), ground_m);
         FrameSettings& settings = (*display)->frame_settings();
         const auto toggle = [&](int key, bool& value) {
             const int presses = controls.take_presses(key);
@@ -82,23 +107,50 @@ Result<void> view(ViewOptions o, double seconds) {
         toggle(GLFW_KEY_F, settings.wireframe);
         toggle(GLFW_KEY_L, settings.colour_by_level);
         toggle(GLFW_KEY_H, show_hud);
+        toggle(GLFW_KEY_V, second_view);
         const int steps = controls.take_presses(GLFW_KEY_LEFT_BRACKET) - controls.take_presses(GLFW_KEY_RIGHT_BRACKET);
-        (*scene)->options().tau_px *= std::pow(1.25, steps);
+        if (steps != 0) {
+            wanted_tau_px *= std::pow(1.25, steps);
+            governor = FrameGovernor({w.fps > 0 ? 1000 / w.fps : 1e9, wanted_tau_px, w.tau_most_px});
+        }
+        (*scene)->options().tau_px = governor.tau_px();
         redraw = redraw || steps != 0;
 
         const FlightPose pose = controls.pose();
         auto camera = camera_of(pose, o);
         if (!camera) return camera.error();
-        const SceneFrame frame = (*scene)->advance({&*camera, 1});
+        std::vector<Camera> views{*camera};
+        if (second_view) {
+            const int inset_width = std::max(1, static_cast<int>(kInsetShare * o.width_px)),
+                      inset_height = std::max(1, static_cast<int>(kInsetShare * o.height_px));
+            if (second_size != std::pair(inset_width, inset_height)) {
+                if (auto ok = (*display)->resize_inset(inset_width, inset_height); !ok) return ok;
+                second_size = {inset_width, inset_height};
+            }
+            auto above =
+                view_from_above(*camera, extent, std::max(ground_m, d.min_height_m), inset_width, inset_height);
+            if (!above) return above.error();
+            views.push_back(*above);
+        }
+        const SceneFrame frame = first ? (*scene)->catch_up(views, now_s, kCatchUp_s) : (*scene)->advance(views, now_s);
+        first = false;
         if (!redraw && !controls.moved() && !frame.stand_ins && frame.uploads == 0) {
             glfwWaitEventsTimeout(0.1);  // nothing changes: leave the core alone
             continue;
         }
-        redraw = frame.stand_ins;
-        (*display)->draw(*camera, frame.selection->to_render(0));
+        redraw = frame.stand_ins || frame.selection->growing;
+        (*display)->draw(*camera, frame.selection->to_render(0), frame.half_curvature);
+        if (second_view) (*display)->draw_inset(views[1], frame.selection->to_render(1), frame.half_curvature);
         (*display)->target().blit_to_window(o.width_px, o.height_px);
+        if (second_view)
+            (*display)->inset().blit_to_window(o.width_px - second_size.first, 0, second_size.first,
+                                               second_size.second);
         const double frame_s = std::chrono::duration<double>(Clock::now() - now).count();
         mean_frame_s = mean_frame_s > 0 ? 0.9 * mean_frame_s + 0.1 * frame_s : frame_s;
+        if (w.fps > 0) {
+            const double before_px = governor.tau_px();
+            redraw = redraw || governor.next(1000 * frame_s) != before_px;
+        }
         if (show_hud) hud.draw(status_lines(**scene, frame, pose, 1 / mean_frame_s, controls.speed_m_per_s()));
         (*display)->context().swap_buffers();
         glfwPollEvents();
@@ -114,14 +166,17 @@ int run_view(int argc, char** argv) {
         "scree-view"};
     ViewOptions o;
     o.size = "1280x800";
-    double seconds = 0;
+    WindowSettings w;
     add_view_options(app, o);
-    app.add_option("--seconds", seconds, "Close after so long; 0: stay open")->capture_default_str();
+    app.add_option("--fps", w.fps, "Raise the tolerance as far as this many frames a second need, and no further")
+        ->check(CLI::Range(0.1, 1000.0));
+    app.add_option("--tau-max", w.tau_most_px, "With --fps: never coarser than this")->capture_default_str();
+    app.add_option("--seconds", w.seconds, "Close after so long; 0: stay open")->capture_default_str();
     app.set_version_flag("--version", std::string("scree-view ") + SCREE_VERSION);
     if (const int code = parse_arguments(app, argc, argv); code >= 0) return code;
     if (auto ok = check_view_options(o); !ok) return report_error("scree-view", ok.error());
     install_interrupt_handler();
-    if (auto ok = view(o, seconds); !ok) return report_error("scree-view", ok.error());
+    if (auto ok = view(o, w); !ok) return report_error("scree-view", ok.error());
     return 0;
 }
 

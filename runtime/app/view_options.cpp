@@ -18,6 +18,10 @@ void add_view_options(CLI::App& app, ViewOptions& o) {
                    "Screen pixels a texel may cover: smaller is sharper and costs memory")
         ->capture_default_str();
     app.add_option("--budget", o.budget, "Ceiling of tile memory, such as 256M")->capture_default_str();
+    app.add_option("--curvature", o.curvature_text,
+                   "Lower what is far away as the earth does: auto (where it shows), on, off")
+        ->capture_default_str();
+    app.add_flag("--no-morph", o.no_morph, "Draw discrete levels: nothing moves, changes pop");
     app.add_option("--json", o.json, "Write the report as JSON to a file, or - for standard output");
 }
 
@@ -34,6 +38,10 @@ Result<void> check_view_options(ViewOptions& o) {
         return Error{ErrorCode::usage, fmt::format("--tau {} is not a length in pixels", o.tau_px)};
     if (!(std::isfinite(o.texture_tau_px) && o.texture_tau_px > 0))
         return Error{ErrorCode::usage, fmt::format("--texture-tau {} is not above 0", o.texture_tau_px)};
+    const auto curvature = curvature_from(o.curvature_text);
+    if (!curvature)
+        return Error{ErrorCode::usage, fmt::format("--curvature {} is not auto, on or off", o.curvature_text)};
+    o.curvature = *curvature;
     if (!(o.fov_deg >= 0.001 && o.fov_deg <= 179))
         return Error{ErrorCode::usage, fmt::format("--fov {} is outside 0.001..179 degrees", o.fov_deg)};
     return {};
@@ -44,6 +52,8 @@ SceneOptions scene_options(const ViewOptions& o) {
     s.budget_bytes = o.budget_bytes;
     s.tau_px = o.tau_px;
     s.texture_tau_px = o.texture_tau_px;
+    s.curvature = o.curvature;
+    s.morph = !o.no_morph;
     return s;
 }
 

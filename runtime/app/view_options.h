@@ -19,11 +19,14 @@ struct ViewOptions {
     double tau_px = 1;
     double texture_tau_px = 1;
     std::string budget = "256M";
+    std::string curvature_text = "auto";
+    bool no_morph = false;
     std::optional<std::string> path;
     std::string json;
 
     int width_px = 800, height_px = 800;
     std::int64_t budget_bytes = 0;
+    Curvature curvature = Curvature::automatic;
 };
 
 void add_view_options(CLI::App& app, ViewOptions& options);

@@ -88,12 +88,16 @@ std::vector<float> RenderTarget::read_depth() const {
     return depths;
 }
 
-void RenderTarget::blit_to_window(int window_width_px, int window_height_px) const {
+void RenderTarget::blit_to_window(int x_px, int y_px, int width_px, int height_px) const {
     const std::uint32_t source = resolved();
-    const bool same = window_width_px == width_px_ && window_height_px == height_px_;
+    const bool same = width_px == width_px_ && height_px == height_px_;
     glDisable(GL_FRAMEBUFFER_SRGB);  // the window takes the stored numbers, whether or not it calls itself sRGB
-    glBlitNamedFramebuffer(source, 0, 0, 0, width_px_, height_px_, 0, 0, window_width_px, window_height_px,
+    glBlitNamedFramebuffer(source, 0, 0, 0, width_px_, height_px_, x_px, y_px, x_px + width_px, y_px + height_px,
                            GL_COLOR_BUFFER_BIT, same ? GL_NEAREST : GL_LINEAR);
+}
+
+void RenderTarget::blit_to_window(int window_width_px, int window_height_px) const {
+    blit_to_window(0, 0, window_width_px, window_height_px);
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     glViewport(0, 0, window_width_px, window_height_px);
 }

@@ -34,6 +34,8 @@ public:
     /// Copies the picture to the window of the current context, stretched when the sizes differ. Leaves the window as
     /// the framebuffer to draw into, writing sRGB numbers as they are: an overlay may follow.
     void blit_to_window(int window_width_px, int window_height_px) const;
+    /// The same into a rectangle of the window, from its lower left corner.
+    void blit_to_window(int x_px, int y_px, int width_px, int height_px) const;
 
     /// The framebuffer to draw into.
     std::uint32_t framebuffer() const { return draw_.framebuffer.name(); }

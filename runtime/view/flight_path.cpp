@@ -7,6 +7,8 @@
 #include <cmath>
 #include <fstream>
 #include <numbers>
+#include <random>
+#include <vector>
 
 #include "common/query/ground.h"
 
@@ -133,6 +135,68 @@ FlightPath resample(const FlightPath& path, int frames) {
             {path[i].eye + (path[next].eye - path[i].eye) * w, path[i].look + (path[next].look - path[i].look) * w});
     }
     return out;
+}
+
+FlightPath paced(const FlightPath& path, double step_m, int frames) {
+    if (path.size() < 2 || !(step_m > 0)) return resample(path, frames);
+    std::vector<double> along{0};
+    for (std::size_t k = 1; k < path.size(); ++k)
+        along.push_back(along.back() + glm::length(path[k].eye - path[k - 1].eye));
+    if (!(along.back() > 0)) return resample(path, frames);
+    FlightPath out;
+    for (int k = 0; k < frames; ++k) {
+        // There and back again.
+        const double lap = std::fmod(k * step_m, 2 * along.back());
+        const double at = lap <= along.back() ? lap : 2 * along.back() - lap;
+        const auto end = std::upper_bound(along.begin() + 1, along.end() - 1, at) - along.begin();
+        const auto j = static_cast<std::size_t>(end);
+        const double run = along[j] - along[j - 1];
+        const double w = run > 0 ? (at - along[j - 1]) / run : 0;
+        out.push_back({path[j - 1].eye + (path[j].eye - path[j - 1].eye) * w,
+                       path[j - 1].look + (path[j].look - path[j - 1].look) * w});
+    }
+    return out;
+}
+
+Result<FlightPath> roaming_flight(const TileStore& store, int frames, std::uint64_t seed) {
+    const Dataset& d = store.dataset();
+    const Lattice& l = d.lattice;
+    auto ground = Ground::open(store);
+    if (!ground) return ground.error();
+    // The standard fixes this generator's numbers, not those of its distributions.
+    std::mt19937_64 random(seed);
+    const auto uniform = [&](double low, double high) {
+        return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
+    };
+    const double width = static_cast<double>(l.cells_x) * l.spacing_m,
+                 depth = static_cast<double>(l.cells_y) * l.spacing_m, extent = std::max(width, depth);
+    FlightPath path;
+    glm::dvec2 at{0};
+    double heading = 0, pitch = 0, above = 0, speed = 0, turn = 0;
+    int left = 0;
+    while (static_cast<int>(path.size()) < frames) {
+        if (left-- <= 0) {
+            left = static_cast<int>(uniform(10, 120));
+            if (path.empty() || uniform(0, 1) < 0.4) {
+                at = {l.x_m(0) + uniform(0, width), l.y_m(0) - uniform(0, depth)};
+                heading = uniform(0, 2 * std::numbers::pi);
+            }
+            above = extent * 0.1 * std::pow(uniform(0, 1), 4) + 2 * l.spacing_m;
+            speed = extent * 0.02 * std::pow(uniform(0, 1), 3);
+            turn = uniform(0, 1) < 0.3 ? uniform(-0.2, 0.2) : 0;
+            pitch = uniform(-1.3, 0.1);
+        }
+        heading += turn;
+        at += speed * glm::dvec2(std::cos(heading), std::sin(heading));
+        auto height = ground_or_floor(**ground, d, {at.x, at.y, 0});
+        if (!height) return height.error();
+        FlightPose pose;
+        pose.eye = {at.x, at.y, *height + above};
+        pose.look = pose.eye + 1000.0 * glm::dvec3(std::cos(heading) * std::cos(pitch),
+                                                   std::sin(heading) * std::cos(pitch), std::sin(pitch));
+        path.push_back(pose);
+    }
+    return path;
 }
 
 FlightPose overview(const Dataset& d, double fov_deg, double aspect) {
