@@ -56,9 +56,10 @@ public:
     struct Wishes {
         /// Slots of resident tiles, parents before children. Planned ones are not evicted in this frame, standing ones
         /// after all others.
-        std::span<const std::int32_t> planned_heights, planned_textures;
-        std::span<const std::int32_t> standing_heights, standing_textures;
-        std::span<const TileRequest> requests;  ///< most urgent first; what is resident or on its way may be among them
+        std::span<const std::int32_t> planned_heights{}, planned_textures{};
+        std::span<const std::int32_t> standing_heights{}, standing_textures{};
+        std::span<const TileRequest>
+            requests{};  ///< most urgent first; what is resident or on its way may be among them
     };
     /// Once a frame, after selection. Requests not begun and no longer wished for are cancelled. A request is begun
     /// only if its tile can be kept: it waits while there is no slot for it. Prefetches take a free slot or one that

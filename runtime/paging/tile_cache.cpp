@@ -126,7 +126,8 @@ void TileCache::touch(std::span<const std::int32_t> slots) {
 std::int32_t TileCache::newest_child(std::int32_t slot) const {
     std::int32_t newest = -1;
     for (const std::int32_t child : pages_.children[static_cast<std::size_t>(slot)])
-        if (child >= 0 && (newest < 0 || entry(child).used_at > entry(newest).used_at)) newest = child;
+        if (child >= 0 && !entry(child).pinned && (newest < 0 || entry(child).used_at > entry(newest).used_at))
+            newest = child;
     return newest;
 }
 

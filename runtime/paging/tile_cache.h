@@ -101,6 +101,7 @@ private:
     void link_newest(std::int32_t slot);
     void link_in_front_of(std::int32_t slot, std::int32_t other);
     void unlink(std::int32_t slot);
+    /// Of those in the list.
     std::int32_t newest_child(std::int32_t slot) const;
     bool evictable(const Entry& e) const {
         return e.state == State::resident && e.live_children == 0 && !e.pinned && e.planned_in != frame_;
