@@ -14,7 +14,7 @@
 namespace scree {
 namespace {
 
-// SQLite's page cache (docs/store-format.md) and connection, a Zstandard context (160 KB) and the thread's stack.
+// SQLite's page cache (128 KB) and connection, a Zstandard context (160 KB) and the thread's stack.
 constexpr std::int64_t kReaderBytes = 512 * 1024;
 
 using Clock = std::chrono::steady_clock;

@@ -19,7 +19,7 @@ constexpr double kHeightShare = 0.2;        // 9.0 KB against 44.0 KB: a page fo
 // A staged tile's names and header, the job that asked for it, and what malloc keeps of its buffer.
 constexpr std::int64_t kStagedBytes = 640;
 // What evictions are remembered by, lists of requests, code and tables of the libraries that reading touches first.
-constexpr std::int64_t kFixedBytes = 512 * 1024;
+constexpr std::int64_t kFixedBytes = 768 * 1024;
 
 constexpr double kMebibyte = 1024.0 * 1024;
 

@@ -13,6 +13,8 @@ namespace {
 
 constexpr double kFromTheStart = -std::numeric_limits<double>::infinity();
 
+constexpr std::size_t kUsualRequests = 1024;  // of a frame; more are taken, too
+
 const char* name_of(TileKind kind) { return kind == TileKind::height ? "height" : "texture"; }
 
 std::string with_tile(const LoadedTile& tile) {
@@ -29,6 +31,8 @@ Pager::Pager(const TileStore& store, const PagerOptions& options, TileSink& sink
       heights_(options.memory.height_slots, store.dataset().lattice, residency_.heights),
       textures_(options.textures ? options.memory.texture_slots : 0, store.dataset().lattice, residency_.textures) {
     residency_.has_textures = options.textures;
+    missing_.reserve(kUsualRequests);
+    promoted_.reserve(2 * static_cast<std::size_t>(options.memory.staging_slots));
 }
 
 Result<std::unique_ptr<Pager>> Pager::create(const TileStore& store, const PagerOptions& options, TileSink& sink) {
@@ -36,6 +40,7 @@ Result<std::unique_ptr<Pager>> Pager::create(const TileStore& store, const Pager
     auto loader = Loader::start(store, options.loader_threads, options.latency_ms);
     if (!loader) return loader.error();
     pager->loader_ = std::move(*loader);
+    Loader::QueueEdit(*pager->loader_).jobs().reserve(2 * static_cast<std::size_t>(options.memory.staging_slots));
     if (auto ok = pager->load_roots(); !ok) return ok.error();
     return pager;
 }

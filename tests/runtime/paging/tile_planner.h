@@ -29,6 +29,16 @@ public:
     TilePlanner(const Dataset& dataset, const MemoryPlan& memory, double detail, bool prefetch = false)
         : dataset_(dataset), slots_{memory.height_slots, memory.texture_slots}, detail_(detail), prefetch_(prefetch) {}
 
+    /// Takes the memory that any plan needs, so that a measurement of the pager's does not count it.
+    void take_memory() {
+        const auto tiles = static_cast<std::size_t>(slots_[0] + slots_[1]);
+        plan_.resident.resize(tiles);
+        plan_.requests.resize(4 * tiles);
+        nodes_.resize(tiles);
+        for (auto* lists : {&plan_.planned, &plan_.standing})
+            for (auto& list : *lists) list.resize(tiles);
+    }
+
     /// `i`, `j`: the point, in finest cells. Allocates nothing new for a plan no larger than an earlier one.
     const TilePlan& plan(const Residency& residency, double i, double j) {
         plan_.requests.clear();
