@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "common/mesh/drawn_surface.h"
 
@@ -76,12 +77,19 @@ Result<std::optional<HeightAt>> best_height(const Lattice& l, double x_m, double
     const double j = on_lattice(l.j_of(y_m), y_m, l.origin_y_m, l.spacing_m);
     const TouchedCells columns = touched_cells(i, l.cells_x), rows = touched_cells(j, l.cells_y);
     std::optional<HeightAt> best;
+    std::vector<HeightAt> all;
     for (std::int64_t cj = rows.first; cj <= rows.last; ++cj)
         for (std::int64_t ci = columns.first; ci <= columns.last; ++ci) {
             auto height = ask(ci, cj, i, j);
             if (!height) return height;
-            if (*height && (!best || (*height)->error_bound_m < best->error_bound_m)) best = *height;
+            if (!*height) continue;
+            if ((*height)->level == l.deepest_level) return height;
+            if (!best || (*height)->error_bound_m < best->error_bound_m) best = *height;
+            all.push_back(**height);
         }
+    // Which of the cells are present nobody knows here, and an error holds for its own present cells only.
+    for (const HeightAt& h : all)
+        best->error_bound_m = std::max(best->error_bound_m, h.error_bound_m + std::abs(h.height_m - best->height_m));
     return best;
 }
 

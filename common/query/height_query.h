@@ -31,7 +31,8 @@ Result<std::optional<HeightAt>> height_over_cell(HeightSource& source, std::int6
                                                  double j);
 
 /// Asks for the height over each finest cell that touches (x, y): up to four where it lies on lines between cells, none
-/// outside the extent or for NaN. The answer with the least error, if any; the first error otherwise.
+/// outside the extent or for NaN. One of the deepest level answers; where there is none, the one with the least error,
+/// its bound wide enough for all. The first error otherwise.
 using HeightOverCell =
     std::function<Result<std::optional<HeightAt>>(std::int64_t ci, std::int64_t cj, double i, double j)>;
 Result<std::optional<HeightAt>> best_height(const Lattice& lattice, double x_m, double y_m, const HeightOverCell& ask);

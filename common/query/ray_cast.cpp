@@ -222,7 +222,8 @@ private:
         return hit_.has_value();
     }
 
-    // True where the ray passes above or below all of a height range.
+    // True where the ray passes above or below all of a height range. A much coarser neighbour's border may lie outside
+    // it, so that the ray may have changed sides at the step.
     bool passes_by(const HeightBounds& bounds, Span span) {
         const double a = ray_.n.at(span.from), b = ray_.n.at(span.to);
         // More than rounding makes of a ray that touches.

@@ -93,7 +93,7 @@ Result<FlightPath> key_poses(const TileStore& store) {
 Result<FlightPath> default_flight(const TileStore& store, int frames) {
     auto path = key_poses(store);
     if (!path) return path;
-    return frames > 0 ? resample(*path, frames) : FlightPath{};
+    return resample(*path, frames);
 }
 
 Result<FlightPath> read_flight_path(const std::string& csv) {

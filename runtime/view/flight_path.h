@@ -21,7 +21,7 @@ using FlightPath = std::vector<FlightPose>;
 /// The default flight over a dataset of extent W (its longer side): the first third low (0.4 % of W, at least 3 cells,
 /// above the ground) along a weaving diagonal, the second high (10 % of W) looking 15 degrees down across the middle,
 /// the last steep (4 % of W) looking 60 degrees down. `frames` poses, linear between 301 key poses; the
-/// clearance holds at the key poses. Deterministic. Errors: those of the store.
+/// clearance holds at the key poses, which are the path for frames <= 0. Deterministic. Errors: those of the store.
 Result<FlightPath> default_flight(const TileStore& store, int frames);
 
 /// Reads `eye_x,eye_y,eye_z,look_x,look_y,look_z` with that header. Errors: ErrorCode::input naming file and line.

@@ -20,6 +20,7 @@ struct ProgramRun {
 struct ProgramOptions {
     double limit_s = 100;                  ///< killed after so long: a hang is a failure, not a stuck test run
     std::vector<std::string> environment;  ///< "NAME=VALUE" sets, "NAME" removes
+    std::string standard_input;            ///< a file to read from instead of nothing
     std::string standard_output;           ///< a file to write to instead, such as /dev/full
     std::string standard_error;            ///< the same
     std::int64_t largest_file_bytes = -1;  ///< writes beyond fail as on a full disk

@@ -41,7 +41,7 @@ protected:
 };
 
 TEST_F(ExitCodes, HelpIsZeroForEveryCommand) {
-    for (const char* command : {"synth", "build", "info", "verify", "export"}) {
+    for (const char* command : {"synth", "build", "info", "height", "verify", "export"}) {
         const auto run = scree({command, "--help"});
         EXPECT_EQ(run.exit_code, 0) << describe(run);
         EXPECT_NE(run.out.find("--json"), std::string::npos) << describe(run);
@@ -76,6 +76,17 @@ TEST_F(ExitCodes, WrongUseIsTwo) {
         {"build", dem_, "-o", other_, "--spacing", "30"},
         {"info"},
         {"info", store_, "--bogus"},
+        {"height"},
+        {"height", store_},
+        {"height", store_, "1"},
+        {"height", store_, "1", "2", "3"},
+        {"height", store_, "1", "nan"},
+        {"height", store_, "inf", "1"},
+        {"height", store_, "1", "-inf"},
+        {"height", store_, "1", "2x"},
+        {"height", store_, "--ray", "0", "0", "0", "0", "0"},
+        {"height", store_, "--ray", "0", "0", "0", "0", "0", "0"},
+        {"height", store_, "--ray", "0", "0", "0", "0", "0", "nan"},
         {"verify"},
         {"export", store_, "-o", other_},
         {"export", store_, "-o", other_, "--texture", "0/0"},
@@ -212,6 +223,7 @@ TEST_F(ExitCodes, MissingStoreIsThreeForEveryReader) {
     const std::string missing = folder_.file("missing.scree");
     expect_refused(scree({"info", missing}), kInput, {missing});
     expect_refused(scree({"verify", missing, "--quiet"}), kInput, {missing});
+    expect_refused(scree({"height", missing, "1", "2"}), kInput, {missing});
     expect_refused(scree({"export", missing, "--texture", "0/0/0", "-o", other_}), kInput, {missing});
     expect_refused(scree_view({"audit", missing}), kInput, {missing});
     expect_refused(scree_view({"fly", missing, "--headless"}), kInput, {missing});
@@ -281,8 +293,9 @@ TEST_F(ExitCodes, LostOutputIsFive) {
     ProgramOptions full;
     full.standard_output = "/dev/full";
     for (const char* json : {"", "-"})
-        for (const char* command : {"info", "verify"}) {
+        for (const char* command : {"info", "verify", "height"}) {
             std::vector<std::string> arguments{command, store_};
+            if (std::string(command) == "height") arguments.insert(arguments.end(), {"400000", "5300000"});
             if (*json != 0) arguments.insert(arguments.end(), {"--json", json});
             EXPECT_EQ(scree(arguments, full).exit_code, kIo) << command << " --json " << json;
         }
@@ -315,6 +328,8 @@ TEST_F(ExitCodes, JsonOnStdoutIsAlone) {
     report_of(scree({"build", dem_, "-o", other_, "--json", "-"}));
     report_of(scree({"info", store_, "--json", "-"}));
     report_of(scree({"verify", store_, "--json", "-"}));
+    report_of(
+        scree({"height", store_, "400000", "5300000", "0", "0", "--ray", "0", "0", "0", "0", "0", "1", "--json", "-"}));
     report_of(scree({"export", store_, "--texture", "0/0/0", "-o", folder_.file("t.dds"), "--json", "-"}));
     report_of(scree({"synth", "-o", folder_.file("land"), "--size", "9", "--json", "-"}));
     report_of(scree_view({"audit", store_, "--frames", "1", "--json", "-"}));

@@ -10,6 +10,7 @@
 #include "common/report.h"
 #include "tools/cli/build_command.h"
 #include "tools/cli/export_command.h"
+#include "tools/cli/height_command.h"
 #include "tools/cli/info_command.h"
 #include "tools/cli/samples_command.h"
 #include "tools/cli/synth_command.h"
@@ -26,6 +27,7 @@ constexpr std::array<Command, 6> kCommands{{
     {"synth", "make a mountain landscape to try things on", scree::run_synth},
     {"build", "cut a DEM and an image into a pyramid", scree::run_build},
     {"info", "say what a store holds", scree::run_info},
+    {"height", "say how high the terrain is at points, or where a ray meets it", scree::run_height},
     {"verify", "check a store: bounds, edges, checksums, completeness", scree::run_verify},
     {"export", "write part of a store in a common format", scree::run_export},
     {"samples", "write a DEM's samples raw, to judge a store by", scree::run_samples},

@@ -57,6 +57,9 @@ TEST(Ground, AnswersEveryVertexOfAPresentCellWithItsSample) {
                 if (cells > 0) {
                     ASSERT_EQ((*height)->height_m, p.z) << i << ", " << j;
                 }
+                const auto down = (*ground)->cast_ray({p.x, p.y, p.z + 100}, {0, 0, -1}, 200);
+                ASSERT_TRUE(down.ok());
+                ASSERT_EQ(down->has_value(), cells > 0) << i << ", " << j;
                 beside_holes += cells > 0 && !terrain.present(i, j) ? 1 : 0;
             }
     }

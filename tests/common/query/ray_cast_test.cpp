@@ -260,13 +260,29 @@ TEST(RayCast, ClosedCellsHoldTheirEdges) {
         EXPECT_EQ(north_to_south->distance_m, 5);
         EXPECT_FALSE(cast(**ground, {{hole_east ? 8.5 : 7.5, -3.25, 50}, {0, 0, -1}}));
     }
-    const SmallWorld world({}, flat, [](std::int64_t, std::int64_t j) { return j < 8; });
-    auto ground = Ground::open(world);
-    ASSERT_TRUE(ground.ok());
-    EXPECT_TRUE(cast(**ground, {{3.25, -8, 50}, {0, 0, -1}}));
-    EXPECT_TRUE(cast(**ground, {{-2, -8, 14}, {1, 0, -1}}));
-    EXPECT_TRUE(cast(**ground, {{16, -8, 50}, {0, 0, -1}})) << "the end of the brink";
-    EXPECT_FALSE(cast(**ground, {{3.25, -8.25, 50}, {0, 0, -1}}));
+    for (const bool hole_south : {false, true}) {
+        const SmallWorld world({}, flat, [=](std::int64_t, std::int64_t j) { return (j < 8) == hole_south; });
+        auto ground = Ground::open(world);
+        ASSERT_TRUE(ground.ok());
+        EXPECT_TRUE(cast(**ground, {{3.25, -8, 50}, {0, 0, -1}}));
+        EXPECT_TRUE(cast(**ground, {{-2, -8, 14}, {1, 0, -1}}));
+        EXPECT_TRUE(cast(**ground, {{16, -8, 50}, {0, 0, -1}})) << "the end of the brink";
+        EXPECT_FALSE(cast(**ground, {{3.25, hole_south ? -8.25 : -7.75, 50}, {0, 0, -1}}));
+    }
+}
+
+// Along a line with ground on one side first and on the other side later, the first ground counts.
+TEST(RayCast, AlongALineTheNearerSideCounts) {
+    for (const bool east_first : {false, true}) {
+        const SmallWorld world(
+            {}, [](std::int64_t, std::int64_t j) { return j < 4 || j > 9 ? 10 : 0; },
+            [=](std::int64_t i, std::int64_t j) { return ((i < 8) == (j < 7)) != east_first; });
+        auto ground = Ground::open(world);
+        ASSERT_TRUE(ground.ok());
+        const auto hit = cast(**ground, {{8, 5, 5}, {0, -1, 0}});
+        ASSERT_TRUE(hit);
+        EXPECT_NEAR(hit->position.y, -3.5, 1e-12);
+    }
 }
 
 // Nothing of a wall: through a hole in the ground a ray passes to the other side unseen.
@@ -368,7 +384,9 @@ TEST(RayCast, SaysWhatIsNoRay) {
     EXPECT_EQ(code(o, down, nan), 2);
     EXPECT_EQ(code(o, down, -1), 2);
     EXPECT_EQ(code(o, {0, 0, -1e-310}, kInfinity), 0);
-    EXPECT_EQ(code(o, {1e308, 1e308, -1e308}, kInfinity), 0);
+    const auto longest = cast(**ground, {{2, -12, 10}, {1.7e308, 1.7e308, -1.7e308}});
+    ASSERT_TRUE(longest);
+    EXPECT_NEAR(longest->position.x, 8, 1e-12);
     EXPECT_EQ(code({-1e15, 1e15, 1e15}, {1e15, -1e15, -1e15}, kInfinity), 0);
 }
 
