@@ -41,7 +41,7 @@ protected:
 };
 
 TEST_F(ExitCodes, HelpIsZeroForEveryCommand) {
-    for (const char* command : {"synth", "build", "info", "height", "verify", "export"}) {
+    for (const char* command : {"synth", "build", "info", "height", "samples", "verify", "export"}) {
         const auto run = scree({command, "--help"});
         EXPECT_EQ(run.exit_code, 0) << describe(run);
         EXPECT_NE(run.out.find("--json"), std::string::npos) << describe(run);
