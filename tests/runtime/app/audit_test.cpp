@@ -74,15 +74,18 @@ TEST(ErrorHistogram, WhatIsNoNumberOrTooLargeIsNotHiddenByTheMaximum) {
     }
 }
 
+/// Positions are floats, as on the GPU.
+constexpr double kRoundingPx = 1e-3;
+
 struct Audited {
     explicit Audited(const test::SyntheticTerrain& t)
         : terrain(t), store(t), residency(t), arena(test::arena_of(t)), selector(t.dataset()) {
         residency.add_all();
         reader = std::move(*store.open_reader());
     }
-    ErrorHistogram audit(const Camera& camera, const DrawList& draws) {
+    ErrorHistogram audit(const Camera& camera, const DrawList& draws, double half_curvature = 0) {
         ErrorHistogram errors;
-        EXPECT_TRUE(audit_frame(store, *reader, camera, draws, arena, errors).ok());
+        EXPECT_TRUE(audit_frame(store, *reader, {camera, draws, arena, half_curvature}, errors).ok());
         return errors;
     }
     const test::SyntheticTerrain& terrain;
@@ -105,9 +108,13 @@ TEST(Audit, TheTruthNeverPassesThePromise) {
             const Camera camera = test::random_camera(random, terrain);
             SelectionSettings settings = test::with_tau(std::exp(test::uniform_real(random, -2, 5)));
             if (k % 3 == 0) settings.height_slots = 12;
-            const Selection& s = a.selector.select({&camera, 1}, settings, a.residency);
-            const ErrorHistogram errors = a.audit(camera, s.draws[0]);
-            ASSERT_LE(errors.max(), s.max_bound_px * (1 + 1e-9) + 1e-9);
+            if (k % 2 == 0) settings.half_curvature = test::random_half_curvature(random, terrain);
+            settings.morph = k % 6 != 5;
+            test::FakeResidency residency = a.residency;
+            if (k % 4 == 3) test::arrive_at_random(random, terrain, residency, settings);
+            const Selection& s = a.selector.select({&camera, 1}, settings, residency);
+            const ErrorHistogram errors = a.audit(camera, s.draws[0], settings.half_curvature);
+            ASSERT_LE(errors.max(), s.max_bound_px + kRoundingPx);
             if (s.max_bound_px > 0) closest = std::max(closest, errors.max() / s.max_bound_px);
             samples += errors.count();
         }
@@ -182,7 +189,7 @@ TEST(Audit, HandsOnTheErrorOfADamagedStore) {
     ErrorHistogram errors;
     DrawItem root;
     root.height_slot = 0;
-    EXPECT_FALSE(audit_frame(store, **reader, *camera, {root}, arena, errors).ok());
+    EXPECT_FALSE(audit_frame(store, **reader, {*camera, {root}, arena}, errors).ok());
 }
 
 }  // namespace

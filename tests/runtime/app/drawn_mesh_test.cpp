@@ -142,7 +142,7 @@ TEST_F(Mesh, ComesBackFromItsPlyFile) {
     const test::TemporaryFolder folder;
     const std::string file = folder.file("mesh.ply");
     const DrawnMesh written = mesh();
-    ASSERT_TRUE(write_ply(file, terrain_.dataset(), written).ok());
+    ASSERT_TRUE(write_ply(file, terrain_.dataset(), written, camera_.eye, 0).ok());
     const auto bytes = test::read_bytes(file);
     const std::string text(bytes.begin(), bytes.end());
     const std::size_t end = text.find("end_header\n");
@@ -175,15 +175,15 @@ TEST_F(Mesh, ComesBackFromItsPlyFile) {
             const LatticeVertex& v = written.corners[3 * t + k];
             ASSERT_EQ(p[0], l.x_m(v.i));
             ASSERT_EQ(p[1], l.y_m(v.j));
-            ASSERT_EQ(p[2], terrain_.dataset().height_m(v.n));
+            ASSERT_EQ(p[2], terrain_.dataset().height_m(static_cast<double>(v.n)));
         }
     }
 }
 
 TEST_F(Mesh, OfNothingIsAnEmptyPly) {
     const test::TemporaryFolder folder;
-    ASSERT_TRUE(write_ply(folder.file("empty.ply"), terrain_.dataset(), {}).ok());
-    EXPECT_FALSE(write_ply(folder.file("no folder/empty.ply"), terrain_.dataset(), {}).ok());
+    ASSERT_TRUE(write_ply(folder.file("empty.ply"), terrain_.dataset(), {}, camera_.eye, 0).ok());
+    EXPECT_FALSE(write_ply(folder.file("no folder/empty.ply"), terrain_.dataset(), {}, camera_.eye, 0).ok());
     EXPECT_EQ(cracks({}).open_edges, 0);
 }
 

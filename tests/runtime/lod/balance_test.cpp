@@ -10,10 +10,10 @@ namespace {
 
 using test::DrawnFrame;
 
-// One drawn frame against every claim; `union_of_views` because an edge may be thinned for a tile that another view
-// sees.
+// One drawn frame against every claim.
 void expect_whole(const test::SyntheticTerrain& terrain, const test::FakeResidency& residency, const Camera& camera,
-                  const DrawList& draws, const CpuArena& arena, const TilePatterns& patterns) {
+                  const DrawList& draws, const CpuArena& arena, const TilePatterns& patterns,
+                  double half_curvature = 0) {
     for (const DrawItem& item : draws) {
         ASSERT_TRUE(residency.holds(item.tile));
         ASSERT_EQ(item.height_slot, terrain.index(item.tile));
@@ -21,8 +21,8 @@ void expect_whole(const test::SyntheticTerrain& terrain, const test::FakeResiden
     const DrawnFrame frame(terrain, draws);
     ASSERT_EQ(frame.unbalanced(), "");
     ASSERT_EQ(frame.cells_drawn_twice(), 0);
-    ASSERT_EQ(frame.visible_cells_missed(camera), 0);
-    ASSERT_EQ(count_holes(terrain.dataset(), residency, camera, draws), 0);
+    ASSERT_EQ(frame.visible_cells_missed(camera, half_curvature), 0);
+    ASSERT_EQ(count_holes(terrain.dataset(), residency, camera, draws, half_curvature), 0);
     const DrawnMesh mesh = drawn_mesh(terrain.dataset(), patterns, draws, arena);
     ASSERT_EQ(frame.leak(mesh), "");
     const CrackReport cracks = count_cracks(terrain.dataset(), draws, mesh);
@@ -33,7 +33,7 @@ void expect_whole(const test::SyntheticTerrain& terrain, const test::FakeResiden
 TEST(Balance, RandomCutsOverRandomResidencyAreWatertightAndDrawEveryVisibleCellOnce) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());
-    std::int64_t thinned = 0, mixed_levels = 0, refined = 0;
+    std::int64_t thinned = 0, mixed_levels = 0, refined = 0, morphed = 0, edges_apart = 0;
     for (int world = 0; world < 60; ++world) {
         const auto terrain = test::random_terrain(random, world % 4 == 3 ? test::kDeepTextures : world % 4);
         const CpuArena arena = test::arena_of(terrain);
@@ -47,11 +47,16 @@ TEST(Balance, RandomCutsOverRandomResidencyAreWatertightAndDrawEveryVisibleCellO
             SelectionSettings settings = test::with_tau(k == 1 ? 0 : std::exp(test::uniform_real(random, -4, 5)));
             settings.texture_tau_px = std::exp(test::uniform_real(random, -1, 3));
             if (k % 3 == 0) settings.height_slots = roots + test::uniform(random, 0, 80);
+            if (k % 2 == 0) settings.half_curvature = test::random_half_curvature(random, terrain);
+            if (k % 4 >= 2) test::arrive_at_random(random, terrain, residency, settings);
+            settings.morph = k % 8 != 7;
             const Camera camera = test::random_camera(random, terrain);
             const Selection& s = selector.select({&camera, 1}, settings, residency);
-            expect_whole(terrain, residency, camera, s.draws[0], arena, patterns);
+            expect_whole(terrain, residency, camera, s.draws[0], arena, patterns, settings.half_curvature);
             if (HasFatalFailure()) return;
             for (const DrawItem& item : s.draws[0]) {
+                morphed += item.morph > 0 ? 1 : 0;
+                edges_apart += item.edge_morph[0] != item.morph ? 1 : 0;
                 thinned += item.edge_mask != 0 ? 1 : 0;
                 mixed_levels += item.tile.level != s.draws[0][0].tile.level ? 1 : 0;
                 refined += item.tile.level == terrain.lattice().deepest_level ? 1 : 0;
@@ -62,6 +67,8 @@ TEST(Balance, RandomCutsOverRandomResidencyAreWatertightAndDrawEveryVisibleCellO
     EXPECT_GT(thinned, 1000);
     EXPECT_GT(mixed_levels, 1000);
     EXPECT_GT(refined, 1000);
+    EXPECT_GT(morphed, 1000);
+    EXPECT_GT(edges_apart, 1000);
 }
 
 TEST(Balance, HoldsWhereOneLoneTileOfManyLevelsIsMissing) {

@@ -61,8 +61,9 @@ TEST(DeepTextures, PartsDrawEveryPresentCellOfTheirTileOnceWithItsMesh) {
             for (const DrawItem& item : s.to_render(0)) {
                 const auto tile = whole.find(item.tile);
                 ASSERT_NE(tile, whole.end());
-                ASSERT_EQ(std::tuple(item.height_slot, item.geomip, item.edge_mask),
-                          std::tuple(tile->second->height_slot, tile->second->geomip, tile->second->edge_mask));
+                const DrawItem& page = *tile->second;
+                ASSERT_EQ(std::tuple(item.height_slot, item.geomip, item.edge_mask, item.morph, item.edge_morph),
+                          std::tuple(page.height_slot, page.geomip, page.edge_mask, page.morph, page.edge_morph));
                 ASSERT_LE(item.part.level, patterns.finest_part_level(item.geomip));
                 const Square q = square_of(l, item);
                 for (std::int64_t j = q.j; j < q.j + q.side; ++j)
@@ -92,8 +93,8 @@ TEST(DeepTextures, EachPartLiesWhereItsScaleAndOffsetSayInItsTexture) {
             const Camera camera = w.near_camera(random);
             const Selection& s = w.selector.select({&camera, 1}, test::with_tau(2), residency);
             for (const DrawItem& item : s.to_render(0)) {
-                ASSERT_GE(item.texture_slot, 0);
-                const TileId texture = w.terrain.textures()[static_cast<std::size_t>(item.texture_slot)];
+                ASSERT_GE(item.texture.slot, 0);
+                const TileId texture = w.terrain.textures()[static_cast<std::size_t>(item.texture.slot)];
                 const double extent =
                     std::ldexp(static_cast<double>(l.tile_extent(l.deepest_level)), l.deepest_level - texture.level);
                 const Square q = square_of(l, item);
@@ -101,9 +102,9 @@ TEST(DeepTextures, EachPartLiesWhereItsScaleAndOffsetSayInItsTexture) {
                 const LatticePoint corner = l.corner(item.tile);
                 for (const std::int64_t end : {std::int64_t{0}, q.side}) {
                     const double u =
-                        item.texture_offset_u + item.texture_scale * static_cast<double>(q.i + end - corner.i) / page;
+                        item.texture.offset_u + item.texture.scale * static_cast<double>(q.i + end - corner.i) / page;
                     const double v =
-                        item.texture_offset_v + item.texture_scale * static_cast<double>(q.j + end - corner.j) / page;
+                        item.texture.offset_v + item.texture.scale * static_cast<double>(q.j + end - corner.j) / page;
                     ASSERT_EQ(u * extent, static_cast<double>(q.i + end) - static_cast<double>(texture.x) * extent);
                     ASSERT_EQ(v * extent, static_cast<double>(q.j + end) - static_cast<double>(texture.y) * extent);
                     ASSERT_TRUE(u >= 0 && u <= 1 && v >= 0 && v <= 1) << "outside its texture";
@@ -129,12 +130,12 @@ TEST(DeepTextures, WithEverythingResidentATexelCoversNoMorePixelsThanAllowed) {
             settings.texture_tau_px = std::exp(test::uniform_real(random, 0, 4));
             const Selection& s = w.selector.select({&camera, 1}, settings, residency);
             for (const DrawItem& item : s.to_render(0)) {
-                const int level = w.terrain.textures()[static_cast<std::size_t>(item.texture_slot)].level;
+                const int level = w.terrain.textures()[static_cast<std::size_t>(item.texture.slot)].level;
                 const Square q = square_of(l, item);
                 // One block of cells is the smallest part; a deeper texture cannot be drawn.
                 if (level == d.texture_deepest_level || q.side == 2 || item.tile.level < l.deepest_level) continue;
                 if (level != item.tile.level + item.part.level) continue;
-                const TileId own = w.terrain.textures()[static_cast<std::size_t>(item.texture_slot)];
+                const TileId own = w.terrain.textures()[static_cast<std::size_t>(item.texture.slot)];
                 for (int quadrant = 0; quadrant < 4; ++quadrant) {
                     if (!w.terrain.has_texture(child_of(own, quadrant))) continue;
                     Box box = w.terrain.box_of(item.tile);
@@ -174,7 +175,8 @@ TEST(DeepTextures, APartReachesNoFurtherThanTheDataDoesSoThatNoPartIsMoreUrgentT
         SelectionSettings settings = test::with_tau(1000);
         settings.texture_slots = slots;
         const Selection& s = selector.select({&*camera, 1}, settings, residency);
-        const std::set<TileId> planned(s.planned_textures.begin(), s.planned_textures.end());
+        const std::vector<TileId> ids = test::planned_tiles(terrain, s, TileKind::texture);
+        const std::set<TileId> planned(ids.begin(), ids.end());
         for (const TileId id : planned)
             if (id.level > 0) {
                 ASSERT_TRUE(planned.contains(parent_of(id)))

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdlib>
 #include <map>
 
@@ -31,7 +34,7 @@ std::int32_t DrawnFrame::item_at(std::int64_t i, std::int64_t j) const {
     return cells_[static_cast<std::size_t>(j * width_ + i)];
 }
 
-std::int64_t DrawnFrame::visible_cells_missed(const Camera& camera) const {
+std::int64_t DrawnFrame::visible_cells_missed(const Camera& camera, double half_curvature) const {
     const Lattice& l = terrain_.lattice();
     const Frustum frustum(camera);
     std::int64_t missed = 0;
@@ -41,8 +44,10 @@ std::int64_t DrawnFrame::visible_cells_missed(const Camera& camera) const {
             bool seen = false;
             for (int k = 0; k < 4; ++k) {
                 const std::int64_t u = i + k % 2, v = j + k / 2;
-                seen |= frustum.contains(
-                    {l.x_m(static_cast<double>(u)), l.y_m(static_cast<double>(v)), terrain_.height_m(u, v)});
+                glm::dvec3 p{l.x_m(static_cast<double>(u)), l.y_m(static_cast<double>(v)), terrain_.height_m(u, v)};
+                const double x = p.x - camera.eye.x, y = p.y - camera.eye.y;
+                p.z -= (x * x + y * y) * half_curvature;
+                seen |= frustum.contains(p);
             }
             missed += seen ? 1 : 0;
         }
@@ -50,28 +55,36 @@ std::int64_t DrawnFrame::visible_cells_missed(const Camera& camera) const {
 }
 
 std::string DrawnFrame::unbalanced() const {
-    std::vector<unsigned> coarser_across(draws_.size(), 0);
-    const auto look_across = [&](std::int32_t a, std::int32_t b, unsigned side) -> std::string {
+    constexpr std::size_t kNorth = 0, kEast = 1, kSouth = 2, kWest = 3;
+    std::vector<std::array<double, 4>> edges(draws_.size());  // greatest level that meets at each side
+    for (std::size_t k = 0; k < draws_.size(); ++k) edges[k].fill(level(draws_[k]));
+    const auto look_across = [&](std::int32_t a, std::int32_t b, std::size_t side) -> std::string {
         if (a == b || a < 0 || b < 0) return {};
         const DrawItem &own = draws_[static_cast<std::size_t>(a)], &other = draws_[static_cast<std::size_t>(b)];
-        if (exponent(other) > exponent(own)) coarser_across[static_cast<std::size_t>(a)] |= side;
-        if (std::abs(exponent(own) - exponent(other)) > 1 ||
-            (own.tile.level > other.tile.level && exponent(own) > exponent(other)))
-            return fmt::format("level {} at stride 2^{} beside level {} at stride 2^{}", own.tile.level, exponent(own),
-                               other.tile.level, exponent(other));
+        double& edge = edges[static_cast<std::size_t>(a)][side];
+        edge = std::max(edge, level(other));
+        if (std::abs(level(own) - level(other)) > 1 || (own.tile.level > other.tile.level && level(own) > level(other)))
+            return fmt::format("level {} at stride 2^{} beside level {} at stride 2^{}", own.tile.level, level(own),
+                               other.tile.level, level(other));
         return {};
     };
     for (std::int64_t j = 0; j < height_; ++j)
         for (std::int64_t i = 0; i < width_; ++i) {
             const std::int32_t here = item_at(i, j), east = item_at(i + 1, j), south = item_at(i, j + 1);
-            for (const std::string& problem :
-                 {look_across(here, east, kEdgeEast), look_across(east, here, kEdgeWest),
-                  look_across(here, south, kEdgeSouth), look_across(south, here, kEdgeNorth)})
+            for (const std::string& problem : {look_across(here, east, kEast), look_across(east, here, kWest),
+                                               look_across(here, south, kSouth), look_across(south, here, kNorth)})
                 if (!problem.empty()) return problem;
         }
     for (std::size_t k = 0; k < draws_.size(); ++k)
-        if (draws_[k].edge_mask != coarser_across[k])
-            return fmt::format("edge mask {} where coarser meshes lie at {}", draws_[k].edge_mask, coarser_across[k]);
+        for (std::size_t side = 0; side < 4; ++side) {
+            const DrawItem& item = draws_[k];
+            const double exponent_there = std::floor(edges[k][side]);
+            const bool thinned = (item.edge_mask >> side & 1) != 0;
+            if (exponent_there + item.edge_morph[side] != edges[k][side] ||
+                thinned != (exponent_there > exponent(item)))
+                return fmt::format("side {} of level 2^{} thinned {} and moved by {} where 2^{} meets it", side,
+                                   level(item), thinned, item.edge_morph[side], edges[k][side]);
+        }
     return {};
 }
 

@@ -18,12 +18,14 @@ public:
     int exponent(const DrawItem& item) const {
         return terrain_.lattice().deepest_level - item.tile.level + item.geomip;
     }
+    /// The same, continuous: with how far it has morphed to the next.
+    double level(const DrawItem& item) const { return exponent(item) + static_cast<double>(item.morph); }
     /// Finest cells (padding included) drawn more than once.
     std::int64_t cells_drawn_twice() const { return twice_; }
     std::int64_t cells_drawn() const { return drawn_; }
     /// Present cells with a corner in view of the camera that nothing is drawn over.
-    std::int64_t visible_cells_missed(const Camera& camera) const;
-    /// What is wrong with the balance or an edge mask, or empty.
+    std::int64_t visible_cells_missed(const Camera& camera, double half_curvature = 0) const;
+    /// What is wrong with the balance, an edge mask or an edge's weight, or empty.
     std::string unbalanced() const;
     /// What is wrong with the mesh, or empty: every edge once each way, or once with nothing drawn beyond it; all
     /// triangles face up; their plan area is that of the tiles drawn.

@@ -8,14 +8,19 @@
 namespace scree {
 namespace {
 
-std::int64_t roots_out_of_view(const test::SyntheticTerrain& terrain, const Selection& s) {
-    std::int64_t out = 0;
+/// Height slots that a plan takes: roots are pinned whether they are in view or not.
+std::int64_t slots_taken(const test::SyntheticTerrain& terrain, const Selection& s) {
+    std::set<TileId> tiles;
+    for (const TileId id : test::planned_tiles(terrain, s, TileKind::height)) tiles.insert(id);
     for (const TileId id : terrain.tiles())
-        out += id.level == 0 &&
-                       std::find(s.planned_heights.begin(), s.planned_heights.end(), id) == s.planned_heights.end()
-                   ? 1
-                   : 0;
-    return out;
+        if (id.level == 0) tiles.insert(id);
+    return static_cast<std::int64_t>(tiles.size());
+}
+
+std::int64_t texture_slots_taken(const test::SyntheticTerrain& terrain, const Selection& s) {
+    const auto ids = test::planned_tiles(terrain, s, TileKind::texture);
+    return terrain.lattice().root_rows * terrain.lattice().root_columns +
+           std::count_if(ids.begin(), ids.end(), [](TileId id) { return id.level > 0; });
 }
 
 TEST(ErrorBound, WithEverythingResidentEveryLeafMeetsTheToleranceAtItsBox) {
@@ -30,12 +35,15 @@ TEST(ErrorBound, WithEverythingResidentEveryLeafMeetsTheToleranceAtItsBox) {
         for (int k = 0; k < 30; ++k) {
             const double tau = std::exp(test::uniform_real(random, -4, 6));
             const Camera camera = test::random_camera(random, terrain);
-            const Selection& s = selector.select({&camera, 1}, test::with_tau(tau), residency);
+            SelectionSettings settings = test::with_tau(tau);
+            if (k % 3 == 0) settings.half_curvature = test::random_half_curvature(random, terrain);
+            settings.morph = k % 4 != 3;
+            const Selection& s = selector.select({&camera, 1}, settings, residency);
             ASSERT_TRUE(s.complete);
             ASSERT_FALSE(s.budget_limited);
             double worst = 0;
             for (const DrawItem& item : s.draws[0]) {
-                const double px = test::bound_px(terrain, camera, item);
+                const double px = test::bound_px(terrain, camera, item, settings.half_curvature);
                 ASSERT_LE(px, tau * (1 + 1e-12));
                 worst = std::max(worst, px);
                 coarse += px > 0 ? 1 : 0;
@@ -49,74 +57,93 @@ TEST(ErrorBound, WithEverythingResidentEveryLeafMeetsTheToleranceAtItsBox) {
     EXPECT_GT(leaves, 10000);  // a cut of finest tiles alone would prove nothing
 }
 
-TEST(ErrorBound, StopsAtTheFirstStrideThatMeetsTheTolerance) {
+// Tolerances are raised by whole steps of an eighth of an octave: textures first, then geometry.
+TEST(ErrorBound, WhereSlotsBindTheCutIsTheUnlimitedOneAtTheLeastToleranceThatFits) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());
-    for (int k = 0; k < 40; ++k) {
-        const auto terrain = test::random_terrain(random);
-        test::FakeResidency residency(terrain);
-        residency.add_all();
-        Selector selector(terrain.dataset());
-        const Camera camera = test::random_camera(random, terrain);
-        const double tau = std::exp(test::uniform_real(random, -2, 5));
-        const Selection& s = selector.select({&camera, 1}, test::with_tau(tau), residency);
-        int finest = 99;
-        for (const DrawItem& item : s.draws[0])
-            finest = std::min(finest, terrain.lattice().deepest_level - item.tile.level + item.geomip);
-        const int coarsest = terrain.lattice().deepest_level + terrain.lattice().tile_cells_log2 - 1;
-        if (finest >= coarsest) continue;
-        // One at least of the densest leaves failed at the doubled stride, or a page above it failed at either stride
-        // (then its children took the stride over), or an edge of it would fail thinned.
-        bool needed = false;
-        for (const DrawItem& item : s.draws[0]) {
-            if (terrain.lattice().deepest_level - item.tile.level + item.geomip != finest) continue;
-            for (int level = item.tile.level; level >= 0; --level)
-                for (int exponent = finest; exponent <= finest + 1; ++exponent) {
-                    DrawItem page;
-                    page.tile = ancestor_at(item.tile, level);
-                    page.geomip = exponent - (terrain.lattice().deepest_level - level);
-                    page.edge_mask = 15;
-                    if (page.geomip < 0 || page.geomip >= terrain.lattice().tile_cells_log2) continue;
-                    if (level == item.tile.level && exponent == finest && finest > 0) continue;
-                    needed |= test::bound_px(terrain, camera, page) > tau;
-                }
+    constexpr double kStep = 1.0905077326652577;  // 2^(1/8)
+    const double coarsest = std::exp2(50);
+    int limited = 0, by_heights = 0, by_textures = 0;
+    for (int world = 0; world < 40; ++world) {
+        const auto terrain = test::random_terrain(random, world % 4 == 3 ? test::kDeepTextures : world % 4);
+        const std::int64_t roots = terrain.lattice().root_rows * terrain.lattice().root_columns;
+        Selector selector(terrain.dataset()), unlimited(terrain.dataset());
+        for (int k = 0; k < 20; ++k) {
+            test::FakeResidency residency(terrain);
+            residency.add_random(random, k % 2 == 0 ? 100 : test::uniform(random, 0, 100));
+            SelectionSettings settings = test::with_tau(k % 5 == 0 ? 0 : std::exp(test::uniform_real(random, -4, 3)));
+            settings.texture_tau_px = std::exp(test::uniform_real(random, -1, 3));
+            if (k % 3 != 1) settings.height_slots = roots + test::uniform(random, 0, 60);
+            if (k % 3 != 0) settings.texture_slots = roots + test::uniform(random, 0, 60);
+            const Camera camera = test::random_camera(random, terrain);
+            const Selection s = selector.select({&camera, 1}, settings, residency);
+            const auto at = [&](double tau, double texture_tau) {
+                SelectionSettings free = test::with_tau(tau);
+                free.texture_tau_px = texture_tau;
+                return unlimited.select({&camera, 1}, free, residency);
+            };
+            const auto fits = [&](const Selection& free) {
+                return slots_taken(terrain, free) <= settings.height_slots &&
+                       texture_slots_taken(terrain, free) <= settings.texture_slots;
+            };
+            ASSERT_TRUE(fits(s));
+            ASSERT_EQ(s.budget_limited, !fits(at(settings.tau_px, settings.texture_tau_px)));
+            Selection free = at(s.tau_effective_px, s.texture_tau_effective_px);
+            ASSERT_FALSE(free.budget_limited);
+            free.budget_limited = s.budget_limited;
+            ASSERT_TRUE(test::same_selection(s, free));
+            if (!s.budget_limited) {
+                ASSERT_EQ(s.tau_effective_px, settings.tau_px);
+                ASSERT_EQ(s.texture_tau_effective_px, settings.texture_tau_px);
+                continue;
+            }
+            ++limited;
+            const double least = std::max(settings.tau_px, 1.0 / 1024);
+            const double steps = 8 * std::log2(s.tau_effective_px / least);
+            if (s.tau_effective_px > settings.tau_px) {
+                ASSERT_NEAR(steps, std::round(steps), 1e-6);
+                const double finer = std::round(steps) == 0 ? settings.tau_px : s.tau_effective_px / kStep;
+                ASSERT_FALSE(fits(at(finer, s.texture_tau_effective_px))) << "heights are needlessly coarse";
+                ++by_heights;
+            }
+            if (s.texture_tau_effective_px > settings.texture_tau_px) {
+                ASSERT_FALSE(fits(at(least * coarsest, s.texture_tau_effective_px / kStep)))
+                    << "textures are needlessly coarse";
+                ++by_textures;
+            }
         }
-        EXPECT_TRUE(needed) << "stride 2^" << finest << " at tau " << tau;
     }
+    EXPECT_GT(limited, 100);
+    EXPECT_GT(by_heights, 50);
+    EXPECT_GT(by_textures, 50);
 }
 
-TEST(ErrorBound, FewerSlotsGiveACoarserCutThatSaysSoAndNeverPlansMoreThanTheSlots) {
+TEST(ErrorBound, WithSlotsForTheRootsAloneTheRootsAreDrawnAndTheirBoundStated) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());
     int limited = 0;
-    for (int world = 0; world < 50; ++world) {
+    for (int world = 0; world < 20; ++world) {
         const auto terrain = test::random_terrain(random, world % 3);
         const std::int64_t roots = terrain.lattice().root_rows * terrain.lattice().root_columns;
+        test::FakeResidency residency(terrain);
+        residency.add_all();
         Selector selector(terrain.dataset());
-        for (int k = 0; k < 30; ++k) {
-            test::FakeResidency residency(terrain);
-            residency.add_random(random, k % 2 == 0 ? 100 : test::uniform(random, 0, 100));
-            SelectionSettings settings = test::with_tau(std::exp(test::uniform_real(random, -4, 3)));
-            settings.height_slots = roots + test::uniform(random, 0, 40);
+        for (int k = 0; k < 10; ++k) {
             const Camera camera = test::random_camera(random, terrain);
+            SelectionSettings settings = test::with_tau(k % 2 == 0 ? 0 : 1);
+            settings.height_slots = settings.texture_slots = roots;
             const Selection& s = selector.select({&camera, 1}, settings, residency);
-            const auto planned = static_cast<std::int64_t>(s.planned_heights.size());
-            ASSERT_LE(planned + roots_out_of_view(terrain, s), settings.height_slots);
-            if (k % 2 != 0) continue;
             ASSERT_TRUE(s.complete);
-            if (s.max_bound_px > settings.tau_px * (1 + 1e-12)) {
-                ASSERT_TRUE(s.budget_limited);
-            }
-            if (s.budget_limited) {
-                ASSERT_GT(planned + roots_out_of_view(terrain, s) + 4, settings.height_slots);
-                ++limited;
-            }
             double worst = 0;
-            for (const DrawItem& item : s.draws[0]) worst = std::max(worst, test::bound_px(terrain, camera, item));
-            ASSERT_NEAR(s.max_bound_px, worst, 1e-9 * worst);  // coarser, and stated
+            for (const DrawItem& item : s.draws[0]) {
+                ASSERT_EQ(item.tile.level, 0);
+                worst = std::max(worst, test::bound_px(terrain, camera, item));
+            }
+            ASSERT_NEAR(s.max_bound_px, worst, 1e-9 * worst);
+            limited += s.budget_limited ? 1 : 0;
         }
     }
-    EXPECT_GT(limited, 20);
+    EXPECT_GT(limited, 50);
 }
 
 TEST(ErrorBound, ASplitThatCannotBeMadeCostsNoSlots) {
@@ -133,8 +160,7 @@ TEST(ErrorBound, ASplitThatCannotBeMadeCostsNoSlots) {
             const Camera camera = test::random_camera(random, terrain);
             SelectionSettings settings = test::with_tau(0);
             const Selection plenty = selector.select({&camera, 1}, settings, residency);
-            settings.height_slots =
-                static_cast<std::int64_t>(plenty.planned_heights.size()) + roots_out_of_view(terrain, plenty);
+            settings.height_slots = slots_taken(terrain, plenty);
             ASSERT_TRUE(test::same_selection(plenty, selector.select({&camera, 1}, settings, residency)));
         }
     }
@@ -186,29 +212,33 @@ TEST(Requests, AreSortedMissingExistingPlannedAndOnce) {
                     ASSERT_GE(s.requests[r - 1].priority, request.priority);
                 }
                 const bool height = request.kind == TileKind::height;
-                ASSERT_FALSE(height ? residency.holds(request.id) : residency.holds_texture(request.id));
-                const auto& planned = height ? s.planned_heights : s.planned_textures;
-                ASSERT_NE(std::find(planned.begin(), planned.end(), request.id), planned.end());
+                ASSERT_FALSE(residency.reaches(request.kind, request.id));
                 ++(height ? heights : textures);
                 ASSERT_TRUE(height ? terrain.tile(request.id) != nullptr : terrain.has_texture(request.id));
             }
             // Nothing that could not be kept: the whole plan fits, roots that are out of view included.
-            ASSERT_LE(static_cast<std::int64_t>(s.planned_heights.size()) + roots_out_of_view(terrain, s),
-                      settings.height_slots);
-            const auto fine = std::count_if(s.planned_textures.begin(), s.planned_textures.end(),
-                                            [](TileId id) { return id.level > 0; });
-            ASSERT_LE(fine + roots, settings.texture_slots);
-            // And it holds together: a planned tile's parent is planned.
-            const std::set<TileId> planned(s.planned_heights.begin(), s.planned_heights.end());
-            for (const TileId id : planned)
-                if (id.level > 0) {
-                    ASSERT_TRUE(planned.contains(parent_of(id)));
+            ASSERT_LE(slots_taken(terrain, s), settings.height_slots);
+            ASSERT_LE(texture_slots_taken(terrain, s), settings.texture_slots);
+            // And it holds together: a planned tile's parent is planned, and listed before it.
+            for (const TileKind kind : {TileKind::height, TileKind::texture}) {
+                const auto tiles = test::planned_tiles(terrain, s, kind);
+                const std::set<TileId> planned(tiles.begin(), tiles.end());
+                for (const TileId id : planned)
+                    if (id.level > 0) {
+                        ASSERT_TRUE(planned.contains(parent_of(id))) << "tile of level " << id.level;
+                    }
+                std::set<TileId> before;
+                const bool height = kind == TileKind::height;
+                for (const std::int32_t slot : height ? s.planned_heights : s.planned_textures) {
+                    ASSERT_GE(slot, 0);
+                    const TileId id = (height ? terrain.tiles() : terrain.textures())[static_cast<std::size_t>(slot)];
+                    ASSERT_TRUE(height ? residency.holds(id) : residency.holds_texture(id));
+                    if (id.level > 0) {
+                        ASSERT_TRUE(before.contains(parent_of(id)));
+                    }
+                    ASSERT_TRUE(before.insert(id).second);
                 }
-            const std::set<TileId> textures_planned(s.planned_textures.begin(), s.planned_textures.end());
-            for (const TileId id : textures_planned)
-                if (id.level > 0) {
-                    ASSERT_TRUE(textures_planned.contains(parent_of(id))) << "texture of level " << id.level;
-                }
+            }
         }
     }
     EXPECT_GT(heights, 500);

@@ -60,8 +60,8 @@ TEST(Selection, OnceCompleteDoesNotDependOnWhatElseIsResident) {
             limited += full.budget_limited ? 1 : 0;
             test::FakeResidency planned(terrain);
             planned.add_roots();
-            for (const TileId id : full.planned_heights) planned.add(id);
-            for (const TileId id : full.planned_textures) planned.add_texture(id);
+            for (const TileId id : test::planned_tiles(terrain, full, TileKind::height)) planned.add(id);
+            for (const TileId id : test::planned_tiles(terrain, full, TileKind::texture)) planned.add_texture(id);
             ASSERT_TRUE(test::same_selection(full, selector.select({&camera, 1}, settings, planned)));
             test::FakeResidency more = planned;
             for (const TileId id : terrain.tiles())
@@ -95,9 +95,9 @@ TEST(Selection, FillingItsRequestsLeadsFromTheRootsToTheFullCutWithinTheSlots) {
                 // What is not planned is lost at once: the hardest pager there could be.
                 test::FakeResidency kept(terrain);
                 kept.add_roots();
-                for (const TileId id : s.planned_heights)
+                for (const TileId id : test::planned_tiles(terrain, s, TileKind::height))
                     if (residency.holds(id)) kept.add(id);
-                for (const TileId id : s.planned_textures)
+                for (const TileId id : test::planned_tiles(terrain, s, TileKind::texture))
                     if (residency.holds_texture(id)) kept.add_texture(id);
                 residency = kept;
                 for (const TileRequest& r : s.requests)
@@ -149,17 +149,17 @@ TEST(Selection, DrawsEveryLeafWithTheNearestResidentTextureAboveItAtItsPlaceInIt
             const Camera camera = test::random_camera(random, terrain);
             const Selection& s = selector.select({&camera, 1}, test::with_tau(1), residency);
             for (const DrawItem& item : s.draws[0]) {
-                ASSERT_GE(item.texture_slot, 0);
-                const TileId texture = terrain.textures()[static_cast<std::size_t>(item.texture_slot)];
+                ASSERT_GE(item.texture.slot, 0);
+                const TileId texture = terrain.textures()[static_cast<std::size_t>(item.texture.slot)];
                 ASSERT_LE(texture.level, item.tile.level);
                 ASSERT_EQ(ancestor_at(item.tile, texture.level), texture);
                 // The corners of the tile, through scale and offset, where they lie in the texture's extent.
                 const Lattice& l = terrain.lattice();
                 const auto extent = static_cast<double>(l.tile_extent(texture.level));
                 const LatticePoint inner = l.corner(item.tile), outer = l.corner(texture);
-                ASSERT_EQ(static_cast<double>(item.texture_offset_u) * extent, static_cast<double>(inner.i - outer.i));
-                ASSERT_EQ(static_cast<double>(item.texture_offset_v) * extent, static_cast<double>(inner.j - outer.j));
-                ASSERT_EQ(static_cast<double>(item.texture_scale) * extent,
+                ASSERT_EQ(static_cast<double>(item.texture.offset_u) * extent, static_cast<double>(inner.i - outer.i));
+                ASSERT_EQ(static_cast<double>(item.texture.offset_v) * extent, static_cast<double>(inner.j - outer.j));
+                ASSERT_EQ(static_cast<double>(item.texture.scale) * extent,
                           static_cast<double>(l.tile_extent(item.tile.level)));
                 ++(texture.level < item.tile.level ? scaled : own);
             }
@@ -184,7 +184,7 @@ TEST(Selection, WithSlotsForRootTexturesAloneDrawsThemAndSaysThatSlotsBind) {
         const Selection& s = selector.select({&camera, 1}, settings, residency);
         EXPECT_TRUE(s.complete);
         for (const DrawItem& item : s.draws[0])
-            EXPECT_EQ(item.texture_slot, terrain.texture_index(ancestor_at(item.tile, 0)));
+            EXPECT_EQ(item.texture.slot, terrain.texture_index(ancestor_at(item.tile, 0)));
         limited += s.budget_limited ? 1 : 0;
     }
     EXPECT_GT(limited, 0);

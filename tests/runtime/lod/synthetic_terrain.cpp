@@ -291,6 +291,12 @@ FakeResidency::State FakeResidency::state(TileKind kind, TileId id) const {
     return slot < 0 ? State::absent : states_[static_cast<std::size_t>(kind)][static_cast<std::size_t>(slot)];
 }
 
+bool FakeResidency::reaches(TileKind kind, TileId id) const {
+    for (int level = 0; level <= id.level; ++level)
+        if (state(kind, ancestor_at(id, level)) != State::resident) return false;
+    return true;
+}
+
 void FakeResidency::change(TileKind kind, TileId id, State to) {
     const std::int32_t slot = index(kind, id);
     if (slot < 0) return;  // not stored

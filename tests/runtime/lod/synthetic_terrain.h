@@ -99,6 +99,9 @@ public:
     bool holds(TileId id) const { return state(TileKind::height, id) == State::resident; }
     bool holds_texture(TileId id) const { return state(TileKind::texture, id) == State::resident; }
 
+    /// Resident, and every tile above it too: what has no resident parent is as good as absent.
+    bool reaches(TileKind kind, TileId id) const;
+
     /// When a tile became resident, whether it is now or not; -infinity, there from the start, unless it is set.
     void set_arrived(TileId id, double seconds) { set_arrived(TileKind::height, id, seconds); }
     void set_texture_arrived(TileId id, double seconds) { set_arrived(TileKind::texture, id, seconds); }
