@@ -12,6 +12,9 @@ struct ProcessUsage {
 
 ProcessUsage process_usage();
 
+/// CPU time of the calling thread so far, seconds.
+double thread_cpu_seconds();
+
 /// Resident memory of this process now, bytes.
 std::int64_t resident_bytes();
 

@@ -34,7 +34,7 @@ struct SceneOptions {
 struct SceneFrame {
     const Selection* selection = nullptr;
     double half_curvature = 0;
-    double select_ms = 0;  ///< selection and requests
+    double select_ms = 0;  ///< selection and requests, CPU time of the thread
     std::int64_t uploads = 0;
     bool stand_ins = false;  ///< drawn coarser than full residency would
 };
