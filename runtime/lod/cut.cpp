@@ -44,25 +44,21 @@ Level level_of_share(double share) { return static_cast<Level>(share * kOneLevel
 
 }  // namespace
 
-Cut::Cut(const Dataset& dataset) : dataset_(dataset), lattice_(dataset.lattice) {}
-
-Box Cut::box_of(const CutNode& node) const {
-    const std::int64_t extent = lattice_.tile_extent(node.id.level);
-    const LatticePoint corner = lattice_.corner(node.id);
-    const auto east = static_cast<double>(std::min(corner.i + extent, lattice_.cells_x));
-    const auto south = static_cast<double>(std::min(corner.j + extent, lattice_.cells_y));
-    return {{lattice_.x_m(static_cast<double>(corner.i)), lattice_.y_m(south), dataset_.height_m(node.bounds->min_n)},
-            {lattice_.x_m(east), lattice_.y_m(static_cast<double>(corner.j)), dataset_.height_m(node.bounds->max_n)}};
+Cut::Cut(const Dataset& dataset)
+    : dataset_(dataset),
+      lattice_(dataset.lattice),
+      east_m_(lattice_.x_m(static_cast<double>(lattice_.cells_x))),
+      south_m_(lattice_.y_m(static_cast<double>(lattice_.cells_y))) {
+    for (int level = 0; level <= lattice_.deepest_level; ++level) {
+        side_m_.push_back(static_cast<double>(lattice_.tile_extent(level)) * lattice_.spacing_m);
+        texel_m_.push_back(dataset.texel_m(level));
+    }
 }
 
-Box lowered_by_curvature(Box box, glm::dvec3 eye, double half_curvature) {
-    if (!(half_curvature > 0)) return box;
-    const glm::dvec2 low = glm::dvec2(box.low) - glm::dvec2(eye), high = glm::dvec2(box.high) - glm::dvec2(eye);
-    const glm::dvec2 nearest = glm::clamp(glm::dvec2(0), low, high);
-    const glm::dvec2 furthest = glm::max(glm::abs(low), glm::abs(high));
-    box.low.z -= glm::dot(furthest, furthest) * half_curvature;
-    box.high.z -= glm::dot(nearest, nearest) * half_curvature;
-    return box;
+Box Cut::box_of(const CutNode& node) const {
+    const double side = side_m_[static_cast<std::size_t>(node.id.level)];
+    return {{node.west_m, std::max(node.north_m - side, south_m_), dataset_.height_m(node.bounds->min_n)},
+            {std::min(node.west_m + side, east_m_), node.north_m, dataset_.height_m(node.bounds->max_n)}};
 }
 
 // What the views that may see the parent see of the node, and how fine it has to be.
@@ -87,13 +83,8 @@ void Cut::measure(CutNode& node, std::uint32_t candidates, std::uint32_t inside)
 }
 
 double Cut::error_m(const CutNode& node, int geomip) const {
-    const double certified =
-        static_cast<double>(node.bounds->error_n[static_cast<std::size_t>(geomip)]) * dataset_.height_quantum_m;
-    if (!(settings_.half_curvature > 0)) return certified;
-    // Between the ends of a triangle's longest side, 2 s where an edge is thinned, a plane stands off the paraboloid by
-    // (2 s)^2 / 8 R.
-    const double stride_m = std::ldexp(lattice_.spacing_m, minimum_exponent(node) + geomip);
-    return certified + stride_m * stride_m * settings_.half_curvature;
+    return static_cast<double>(node.bounds->error_n[static_cast<std::size_t>(geomip)]) * dataset_.height_quantum_m +
+           curving_m_[static_cast<std::size_t>(minimum_exponent(node) + geomip)];
 }
 
 // The coarsest level within the tolerance. Between two levels the error is taken as linear in the weight: the surfaces
@@ -128,10 +119,13 @@ void Cut::judge(CutNode& node, double parent_error_m) const {
 
 void Cut::judge_texture(CutNode& node) const {
     if (node.id.level >= dataset_.texture_deepest_level) return;
-    node.texture_need = dataset_.texel_m(node.id.level) / node.texel_per_px / settings_.texture_tau_px;
+    node.texture_need =
+        texel_m_[static_cast<std::size_t>(node.id.level)] / node.texel_per_px / settings_.texture_tau_px;
+    const bool parts = node.id.level == lattice_.deepest_level;
+    if (parts ? node.texture_need <= 1 : node.level <= level_of(maximum_exponent(node) - 1)) return;
     const double doublings = std::min(std::log2(node.texture_need), 64.0);
     double limit = 0;
-    if (node.id.level < lattice_.deepest_level) {
+    if (!parts) {
         limit = maximum_exponent(node) - 1 + kTextureApproach * std::max(0.0, -doublings);
     } else {
         // Textures deeper than the heights are drawn on parts of the page, each of one block of cells at least.
@@ -146,10 +140,14 @@ std::int32_t Cut::add_node(TileId id, const HeightBounds& bounds, std::int32_t s
                            std::int32_t parent) {
     CutNode& node = nodes_.emplace_back();
     node.id = id;
+    node.page_level = static_cast<std::int8_t>(id.level);
     node.bounds = &bounds;
     node.slot = slot;
     node.texture_slot = texture_slot;
     node.parent = parent;
+    const LatticePoint corner = lattice_.corner(id);
+    node.west_m = lattice_.x_m(static_cast<double>(corner.i));
+    node.north_m = lattice_.y_m(static_cast<double>(corner.j));
     const CutNode* above = parent < 0 ? nullptr : &nodes_[static_cast<std::size_t>(parent)];
     const auto every_view = static_cast<std::uint32_t>((std::uint64_t{1} << views_.size()) - 1);
     measure(node, above == nullptr ? every_view : above->seen_by, above == nullptr ? 0 : above->inside);
@@ -189,8 +187,8 @@ std::int32_t Cut::neighbour(std::int32_t index, int direction) {
     std::int32_t& link = node.neighbours[static_cast<std::size_t>(direction)];
     while (link >= 0) {
         const CutNode& other = nodes_[static_cast<std::size_t>(link)];
-        if (!other.split || other.id.level >= node.id.level) break;
-        link = other.children[quadrant_towards(across(node.id, direction), other.id.level)];
+        if (!other.split || other.page_level >= node.page_level) break;
+        link = other.children[quadrant_towards(across(node.id, direction), other.page_level)];
     }
     return link;
 }
@@ -309,6 +307,13 @@ bool Cut::refine(std::span<const LodView> views, const CutSettings& settings, co
     views_ = views;
     settings_ = settings;
     residency_ = &residency;
+    // Between the ends of a triangle's longest side, 2 s where an edge is thinned, a plane stands off the paraboloid by
+    // (2 s)^2 / 8 R.
+    curving_m_.resize(static_cast<std::size_t>(lattice_.deepest_level + lattice_.tile_cells_log2));
+    for (std::size_t exponent = 0; exponent < curving_m_.size(); ++exponent) {
+        const double stride_m = std::ldexp(lattice_.spacing_m, static_cast<int>(exponent));
+        curving_m_[exponent] = stride_m * stride_m * settings.half_curvature;
+    }
     nodes_.clear();
     queue_.clear();
     pages_ = steps_ = 0;
@@ -364,7 +369,7 @@ void Cut::constrain_neighbours(std::int32_t index) {
             if (beside.level > limit && lower(other, limit)) continue;
             // Anything may have moved in memory.
             const CutNode& settled = nodes_[static_cast<std::size_t>(other)];
-            const bool larger = settled.id.level < nodes_[static_cast<std::size_t>(index)].id.level;
+            const bool larger = settled.page_level < nodes_[static_cast<std::size_t>(index)].page_level;
             own_limit = std::min(own_limit, larger ? settled.level : settled.level + kOneLevel);
             break;
         }

@@ -9,6 +9,7 @@
 // continuously with the eye.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -44,26 +45,30 @@ enum class Direction : int { north = 0, east = 1, south = 2, west = 3 };
 inline constexpr std::array<Direction, 4> kDirections{Direction::north, Direction::east, Direction::south,
                                                       Direction::west};
 
-struct CutNode {
-    TileId id;
-    const HeightBounds* bounds = nullptr;
-    std::int32_t slot = kNotResident;          ///< of its height tile
-    std::int32_t texture_slot = kNotResident;  ///< of the texture tile of the same address
-    std::int32_t parent = -1;
-    std::array<std::int32_t, 4> children{-1, -1, -1, -1};    ///< -1: does not exist, or the node is not split
-    std::array<std::int32_t, 4> neighbours{-1, -1, -1, -1};  ///< by Direction: a node as large or larger, or -1
-    Level level = 0;            ///< drawn; of a split node: what it would be drawn at as a leaf
-    Level floor = 0;            ///< least level that it can be drawn at in this cut
-    std::uint32_t seen_by = 0;  ///< views that may see its box; without any it is neither refined nor drawn
-    std::uint32_t inside = 0;   ///< views that see all of its box
+/// What the rules between neighbours look at comes first: it fills one line of the cache.
+struct alignas(64) CutNode {
     bool split = false;
     bool wants_geometry = false;  ///< its finest mesh is not good enough
     bool queued = false;
-    double metres_per_px = 0;   ///< least over the views that see it of d / (f K): error allowed for one pixel
-    double texel_per_px = 0;    ///< least over the views of d / f: metres of texture a pixel covers
-    double finest_error_m = 0;  ///< of its own densest mesh, thinned edges included
-    double texture_need = 0;    ///< of its own texture over the tolerance, where finer textures exist
-    double priority = 0;        ///< need of the parent when it was split
+    std::int8_t page_level = 0;  ///< id.level
+    std::uint32_t seen_by = 0;   ///< views that may see its box; without any it is neither refined nor drawn
+    Level level = 0;             ///< drawn; of a split node: what it would be drawn at as a leaf
+    Level floor = 0;             ///< least level that it can be drawn at in this cut
+    std::array<std::int32_t, 4> neighbours{-1, -1, -1, -1};  ///< by Direction: a node as large or larger, or -1
+    std::array<std::int32_t, 4> children{-1, -1, -1, -1};    ///< -1: does not exist, or the node is not split
+    std::int32_t parent = -1;
+    std::int32_t slot = kNotResident;          ///< of its height tile
+    std::int32_t texture_slot = kNotResident;  ///< of the texture tile of the same address
+
+    TileId id;
+    const HeightBounds* bounds = nullptr;
+    double metres_per_px = 0;        ///< least over the views that see it of d / (f K): error allowed for one pixel
+    double texel_per_px = 0;         ///< least over the views of d / f: metres of texture a pixel covers
+    double west_m = 0, north_m = 0;  ///< its north-west corner
+    double finest_error_m = 0;       ///< of its own densest mesh, thinned edges included
+    double texture_need = 0;         ///< of its own texture over the tolerance, where finer textures exist
+    double priority = 0;             ///< need of the parent when it was split
+    std::uint32_t inside = 0;        ///< views that see all of its box
 
     bool visible() const { return seen_by != 0; }
 };
@@ -79,7 +84,16 @@ struct CutSettings {
 };
 
 /// A box as it is seen over a curved earth: lowered by the least and the greatest drop within it.
-Box lowered_by_curvature(Box box, glm::dvec3 eye, double half_curvature);
+inline Box lowered_by_curvature(Box box, const glm::dvec3& eye, double half_curvature) {
+    if (!(half_curvature > 0)) return box;
+    const double west = box.low.x - eye.x, east = box.high.x - eye.x, south = box.low.y - eye.y,
+                 north = box.high.y - eye.y;
+    const double near_x = std::clamp(0.0, west, east), near_y = std::clamp(0.0, south, north);
+    const double far_x = std::max(-west, east), far_y = std::max(-south, north);
+    box.low.z -= (far_x * far_x + far_y * far_y) * half_curvature;
+    box.high.z -= (near_x * near_x + near_y * near_y) * half_curvature;
+    return box;
+}
 
 class Cut {
 public:
@@ -137,6 +151,10 @@ private:
 
     const Dataset& dataset_;
     const Lattice lattice_;
+    const double east_m_, south_m_;  ///< where the data ends
+    std::vector<double> side_m_;     ///< by level: of a page
+    std::vector<double> texel_m_;    ///< by level
+    std::vector<double> curving_m_;  ///< by exponent: what a flat triangle of that stride misses of the curvature
     std::span<const LodView> views_;
     CutSettings settings_;
     const Residency* residency_ = nullptr;

@@ -19,10 +19,10 @@ TileId texture_of(const CutNode& node, TilePart part) {
 
 /// How the texture `up` levels above a page lies on it.
 TexturePlacement placement(TileId page, int up, std::int32_t slot) {
-    const std::int64_t mask = (std::int64_t{1} << up) - 1;
-    return {slot, static_cast<float>(std::ldexp(1.0, -up)),
-            static_cast<float>(std::ldexp(static_cast<double>(page.x & mask), -up)),
-            static_cast<float>(std::ldexp(static_cast<double>(page.y & mask), -up))};
+    const std::int64_t side = std::int64_t{1} << up;
+    const double scale = 1.0 / static_cast<double>(side);  // a power of two: exact
+    return {slot, static_cast<float>(scale), static_cast<float>(static_cast<double>(page.x & (side - 1)) * scale),
+            static_cast<float>(static_cast<double>(page.y & (side - 1)) * scale)};
 }
 
 }  // namespace
@@ -34,13 +34,16 @@ struct TexturePlan::Part {
     double need = 0;
 };
 
-TexturePlan::TexturePlan(const Dataset& dataset) : dataset_(dataset) {}
+TexturePlan::TexturePlan(const Dataset& dataset) : dataset_(dataset) {
+    for (int level = 0; level <= std::max(dataset.texture_deepest_level, dataset.lattice.deepest_level); ++level)
+        texel_m_.push_back(dataset.texel_m(level));
+}
 
 // Levels from a leaf's own texture, or the pyramid's deepest above it, up to the coarsest that is sharp enough.
 int TexturePlan::wanted_steps_up(const CutNode& node) const {
     int level = std::min(node.id.level, dataset_.texture_deepest_level);
     const double allowed_m = settings_.texture_tau_px * node.texel_per_px;
-    while (level > 0 && dataset_.texel_m(level - 1) <= allowed_m) --level;
+    while (level > 0 && texel_m(level - 1) <= allowed_m) --level;
     return node.id.level - level;
 }
 
@@ -63,9 +66,9 @@ std::int64_t TexturePlan::wish(const Cut& cut, std::span<const LodView> views, c
         for (int step = 0; step < up; ++step) index = nodes[static_cast<std::size_t>(index)].parent;
         for (; index >= 0; index = nodes[static_cast<std::size_t>(index)].parent) {
             const CutNode& node = nodes[static_cast<std::size_t>(index)];
-            const double need =
-                node.id.level == 0 ? kInfinity
-                                   : dataset_.texel_m(node.id.level - 1) / leaf.texel_per_px / settings_.texture_tau_px;
+            const double need = node.id.level == 0
+                                    ? kInfinity
+                                    : texel_m(node.id.level - 1) / leaf.texel_per_px / settings_.texture_tau_px;
             double& known = needs_[static_cast<std::size_t>(index)];
             if (known >= need) break;  // the ancestors have been reached from as near before
             if (known == 0 && node.id.level > 0) ++count;
@@ -116,7 +119,7 @@ void TexturePlan::place(const Cut& cut, std::int32_t leaf, double fade_s, DrawIt
     if (!resident(index)) return;
     item.texture = placed(index);
     const CutNode& chosen = nodes[static_cast<std::size_t>(index)];
-    add_neighbours(chosen.id, dataset_.texel_m(chosen.id.level) / own.texel_per_px, item);
+    add_neighbours(chosen.id, texel_m(chosen.id.level) / own.texel_per_px, item);
     const double age_s =
         residency_->now_s - residency_->textures.arrived_s[static_cast<std::size_t>(item.texture.slot)];
     if (!(age_s < fade_s) || !rise(index) || !resident(index)) return;
@@ -187,7 +190,7 @@ void TexturePlan::for_each_deep_child(const CutNode& node, const Part& part, con
     for (int q = 0; q < 4; ++q) {
         if ((exists >> q & 1) == 0) continue;
         const TilePart child{part.part.level + 1, 2 * part.part.x + (q & 1), 2 * part.part.y + (q >> 1)};
-        const double need = dataset_.texel_m(level) / texel_per_px(node, child) / settings_.texture_tau_px;
+        const double need = texel_m(level) / texel_per_px(node, child) / settings_.texture_tau_px;
         visit(Part{child, residency_->textures.children[slot][static_cast<std::size_t>(q)], need});
     }
 }
@@ -234,7 +237,7 @@ void TexturePlan::emit_part(const CutNode& node, const Part& part, const DrawIte
         drawn.texture_share = 1;
         drawn.neighbour_textures.fill(-1);
         const TileId texture = texture_of(node, child.part);
-        const double texel_px = dataset_.texel_m(texture.level) / texel_per_px(node, child.part);
+        const double texel_px = texel_m(texture.level) / texel_per_px(node, child.part);
         // The part fills its texture: all its borders are the texture's.
         DrawItem whole = drawn;
         whole.texture = {child.slot, 1, 0, 0};

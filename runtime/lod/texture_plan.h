@@ -44,6 +44,7 @@ private:
         double need;
     };
     struct Part;
+    double texel_m(int level) const { return texel_m_[static_cast<std::size_t>(level)]; }
     int wanted_steps_up(const CutNode& node) const;
     double texel_per_px(const CutNode& node, TilePart part) const;
     template <class Visit>
@@ -54,6 +55,7 @@ private:
     void add_neighbours(TileId texture, double texel_px, DrawItem& item) const;
 
     const Dataset& dataset_;
+    std::vector<double> texel_m_;  ///< by level
     std::span<const LodView> views_;
     CutSettings settings_;
     const Residency* residency_ = nullptr;

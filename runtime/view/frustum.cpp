@@ -4,11 +4,6 @@
 
 namespace scree {
 
-double distance_to_box(glm::dvec3 point, const Box& box) {
-    const glm::dvec3 nearest = glm::clamp(point, box.low, box.high);
-    return glm::length(point - nearest);
-}
-
 Frustum::Frustum(const Camera& camera) : eye_(camera.eye), forward_(camera.forward), near_m_(camera.near_m) {
     const glm::dvec3 right = camera.right(), up = camera.up;
     const double tx = camera.tan_half_x(), ty = camera.tan_half_y();

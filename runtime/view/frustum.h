@@ -3,7 +3,9 @@
 // none).
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 
 #include <glm/glm.hpp>
 
@@ -17,7 +19,12 @@ struct Box {
 };
 
 /// Distance from a point to a box, 0 inside.
-double distance_to_box(glm::dvec3 point, const Box& box);
+inline double distance_to_box(const glm::dvec3& point, const Box& box) {
+    const double x = std::max({box.low.x - point.x, 0.0, point.x - box.high.x});
+    const double y = std::max({box.low.y - point.y, 0.0, point.y - box.high.y});
+    const double z = std::max({box.low.z - point.z, 0.0, point.z - box.high.z});
+    return std::sqrt(x * x + y * y + z * z);
+}
 
 enum class Sight { none, some, all };
 

@@ -29,6 +29,8 @@ int run(const std::string& file, double tau_px, int frames, double step_m) {
     if (!key_poses) return 1;
     const FlightPath path = paced(*key_poses, step_m, frames);
     for (const bool settled : {true, false}) {
+        options.growth_s = settled ? 0 : 0.15;
+        options.foresight_s = settled ? 0 : 1;
         auto scene = Scene::open(**store, options);
         NoSink sink;
         if (!scene || !(*scene)->start(sink)) return 1;
