@@ -184,7 +184,7 @@ TEST(PartialTiles, AStepBesideAHoleIsBoundedByTheGroundThatIsThere) {
                                                            : j == 4 ? 22
                                                            : j == 2 ? -50
                                                                     : 0; },
-        [](std::int64_t i, std::int64_t j) { return i < 16 || j >= 8; });
+        [](std::int64_t i, std::int64_t j) { return i < 16 || i >= 22 || j >= 8; });
     Without source(world, [](TileId id) { return id.level > 1 && in_half(id, 1); });
     const auto hit = cast_ray(source, {15.5, -2, 10}, {1, 0, 0}, 4);
     ASSERT_TRUE(hit.ok() && hit->has_value());
