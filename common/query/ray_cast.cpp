@@ -188,8 +188,11 @@ private:
 
     void meet_triangle(const Surface& surface, Span span) {
         const double above_from = above(surface, span.from), above_to = above(surface, span.to);
-        if (change_side(span.from, above_from, surface.error_m)) return;
-        change_side(between(span, above_from, above_to), above_to, surface.error_m);
+        if (enter(span.from, above_from, reach_m(surface, above_from))) return;
+        if (side_of(above_to) != side_)
+            hit_ = Hit{between(span, above_from, above_to), surface.error_m};
+        else
+            side_reach_m_ = reach_m(surface, above_to);
     }
 
     // Position in the tile's own samples. Rounding must not leave the tile.
@@ -211,14 +214,20 @@ private:
         return std::clamp(span.from + from * ((span.to - span.from) / (from - to)), span.from, span.to);
     }
 
-    // From here on the ray is above (> 0) or below (< 0) the surface: a hit where it was not before.
-    bool change_side(double distance, double above, double error_m) {
-        const int side = above > 0 ? 1 : above < 0 ? -1 : 0;
-        const bool changed = side_ != 0 && side != side_;
-        // At a step between two tiles the true surface is within the errors of both.
-        if (side == 0 || changed) hit_ = Hit{distance, changed ? std::max(error_m, side_error_m_) : error_m};
+    static int side_of(double above) { return above > 0 ? 1 : above < 0 ? -1 : 0; }
+
+    // How far from the ray, up or down, the true surface can be.
+    double reach_m(const Surface& surface, double above) const {
+        return surface.error_m + std::abs(above) * source_.dataset().height_quantum_m;
+    }
+
+    // From here on the ray is above (> 0) or below (< 0) the surface: a hit where it was not before. At such a step
+    // either side may turn out to be absent, so the bound holds for both.
+    bool enter(double distance, double above, double reach_m) {
+        const int side = side_of(above);
+        if (side == 0 || (side_ != 0 && side != side_))
+            hit_ = Hit{distance, side_ == 0 ? reach_m : std::max(reach_m, side_reach_m_)};
         side_ = side;
-        side_error_m_ = error_m;
         return hit_.has_value();
     }
 
@@ -229,12 +238,13 @@ private:
         // More than rounding makes of a ray that touches.
         const double margin = 16 * std::numeric_limits<double>::epsilon() *
                               (std::abs(ray_.n.start) + std::abs(a) + std::abs(b) + kMaxHeightUnits);
-        if (std::min(a, b) > bounds.max_n + margin)
-            change_side(span.from, 1, 0);
-        else if (std::max(a, b) < bounds.min_n - margin)
-            change_side(span.from, -1, 0);
-        else
-            return false;
+        const bool over = std::min(a, b) > bounds.max_n + margin;
+        if (!over && !(std::max(a, b) < bounds.min_n - margin)) return false;
+        const auto reach_at = [&](double n) {
+            return std::max(std::abs(n - bounds.min_n), std::abs(n - bounds.max_n)) *
+                   source_.dataset().height_quantum_m;
+        };
+        if (!enter(span.from, over ? 1 : -1, reach_at(a))) side_reach_m_ = reach_at(b);
         return true;
     }
 
@@ -246,8 +256,8 @@ private:
     HeightSource& source_;
     const Lattice& lattice_;
     LatticeRay ray_;
-    int side_ = 0;  // of the last place looked at: 1 above, -1 below, 0 nothing there
-    double side_error_m_ = 0;
+    int side_ = 0;             // of the last place looked at: 1 above, -1 below, 0 nothing there
+    double side_reach_m_ = 0;  // reach_m there
     std::optional<Hit> hit_;
 };
 

@@ -17,8 +17,8 @@ struct Vector3 {
 struct RayHit {
     Vector3 position;
     double distance_m = 0;
-    /// The true surface passes within so much above or below `position` (surface_error_m), where the cell is present
-    /// (at a step between two tiles: on both sides).
+    /// The true surface, where the cell is present, passes within so much above or below `position`: surface_error_m,
+    /// and more at a step between tiles of different levels.
     double error_bound_m = 0;
 };
 

@@ -175,6 +175,23 @@ TEST(PartialTiles, AStepAboveAllOfATileIsNoGap) {
     }
 }
 
+// The coarse side of a step may be over a hole that it does not know of: then only the other side is true.
+TEST(PartialTiles, AStepBesideAHoleIsBoundedByTheGroundThatIsThere) {
+    test::WorldShape shape;
+    shape.cells_x = shape.cells_y = 32;
+    const test::SmallWorld world(
+        shape, [](std::int64_t i, std::int64_t j) { return i != 16  ? 0
+                                                           : j == 4 ? 22
+                                                           : j == 2 ? -50
+                                                                    : 0; },
+        [](std::int64_t i, std::int64_t j) { return i < 16 || i >= 22 || j >= 8; });
+    Without source(world, [](TileId id) { return id.level > 1 && in_half(id, 1); });
+    const auto hit = cast_ray(source, {15.5, -2, 10}, {1, 0, 0}, 4);
+    ASSERT_TRUE(hit.ok() && hit->has_value());
+    EXPECT_EQ((*hit)->position.x, 16);
+    EXPECT_GE((*hit)->error_bound_m, 60) << "the ground is at -50, the ray at 10";
+}
+
 TEST(PartialTiles, WhereCoarseTilesMeetTheBetterAnswersForBoth) {
     test::WorldShape shape;
     shape.cells_x = shape.cells_y = 32;
