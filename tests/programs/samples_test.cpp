@@ -217,9 +217,16 @@ TEST_F(Samples, AreWholeOrAbsent) {
             std::error_code error;
             return std::filesystem::file_size(partial, error) > 100000 && !error;
         };
+        std::uintmax_t largest = 0;
+        stopped.meanwhile = [&largest, partial = out + ".partial"] {
+            std::error_code error;
+            const auto size = std::filesystem::file_size(partial, error);
+            if (!error) largest = std::max(largest, size);
+        };
         const auto end = scree(long_work, stopped);
         ASSERT_TRUE(end.signalled) << describe(end);
         EXPECT_EQ(end.exit_code, 130) << describe(end);
+        EXPECT_LT(largest, 100ull * 1025 * 1025 * 4) << "half of the work was done after the signal";
         expect_only(folder, {});
     }
 }
