@@ -136,30 +136,36 @@ void Cut::judge_texture(CutNode& node) const {
     node.level = std::max(node.level, level_of(minimum_exponent(node)));
 }
 
+// -1: no view sees it, and what is not seen is neither refined nor drawn nor anybody's neighbour.
 std::int32_t Cut::add_node(TileId id, const HeightBounds& bounds, std::int32_t slot, std::int32_t texture_slot,
                            std::int32_t parent) {
+    const auto every_view = static_cast<std::uint32_t>((std::uint64_t{1} << views_.size()) - 1);
     CutNode& node = nodes_.emplace_back();
+    const CutNode* above = parent < 0 ? nullptr : &nodes_[static_cast<std::size_t>(parent)];
     node.id = id;
-    node.page_level = static_cast<std::int8_t>(id.level);
     node.bounds = &bounds;
-    node.slot = slot;
-    node.texture_slot = texture_slot;
-    node.parent = parent;
     const LatticePoint corner = lattice_.corner(id);
     node.west_m = lattice_.x_m(static_cast<double>(corner.i));
     node.north_m = lattice_.y_m(static_cast<double>(corner.j));
-    const CutNode* above = parent < 0 ? nullptr : &nodes_[static_cast<std::size_t>(parent)];
-    const auto every_view = static_cast<std::uint32_t>((std::uint64_t{1} << views_.size()) - 1);
     measure(node, above == nullptr ? every_view : above->seen_by, above == nullptr ? 0 : above->inside);
+    if (!node.visible()) {
+        nodes_.pop_back();
+        return -1;
+    }
+    node.page_level = static_cast<std::int8_t>(id.level);
+    node.slot = slot;
+    node.texture_slot = texture_slot;
+    node.parent = parent;
     judge(node, above == nullptr ? kInfinity : above->finest_error_m);
     if (above != nullptr) node.level = std::min(node.level, above->level);
-    if (node.visible() || parent < 0) ++pages_;
+    ++pages_;
     return static_cast<std::int32_t>(nodes_.size()) - 1;
 }
 
 void Cut::add_roots() {
     const std::vector<std::int32_t>& slots = residency_->heights.roots;
     roots_.assign(slots.size(), -1);
+    pages_ = std::count_if(slots.begin(), slots.end(), [](std::int32_t slot) { return slot >= 0; });
     for (std::size_t k = 0; k < slots.size(); ++k) {
         if (slots[k] < 0) continue;  // a root without any present cell is not stored
         const TileId id{0, static_cast<std::int64_t>(k) % lattice_.root_columns,
@@ -167,6 +173,7 @@ void Cut::add_roots() {
         const HeightTileHeader& header = residency_->heights.headers[static_cast<std::size_t>(slots[k])];
         const std::int32_t texture = residency_->textures.roots.empty() ? kNotResident : residency_->textures.roots[k];
         roots_[k] = add_node(id, header.own, slots[k], texture, -1);
+        if (roots_[k] >= 0) --pages_;  // pinned: counted whether in view or not
     }
     for (const std::int32_t root : roots_) {
         if (root < 0) continue;
@@ -242,8 +249,9 @@ bool Cut::try_split(std::int32_t index) {
             parent.texture_slot < 0 ? kNotResident
                                     : residency_->textures.children[static_cast<std::size_t>(parent.texture_slot)][k];
         children[k] = add_node(child_of(parent.id, q), header.children[k], slots[k], texture, index);
+        if (children[k] < 0) continue;
         const CutNode& child = nodes_[static_cast<std::size_t>(children[k])];
-        if (!child.visible() || child.slot >= 0) continue;
+        if (child.slot >= 0) continue;
         if (settings_.only_resident || child.slot == kUnavailable) {
             nodes_.resize(first);
             pages_ = pages_before;
