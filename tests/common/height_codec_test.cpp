@@ -75,6 +75,34 @@ TEST(HeightCodec, RandomTilesComeBackExactly) {
     }
 }
 
+TEST(HeightCodec, AHeightOutOfRangeIsRefusedWhereverItStands) {
+    const HeightTile sound = small_tile();
+    for (const HeightCodec codec : kCodecs)
+        for (std::size_t k = 0; k < sound.samples.size(); ++k)
+            for (const std::int32_t bad :
+                 {kMaxHeightUnits + 1, -kMaxHeightUnits - 1, std::int32_t{1} << 30, -(std::int32_t{1} << 30)}) {
+                HeightTile tile = sound;
+                tile.samples[k] = bad;
+                EXPECT_FALSE(decode_height_tile(encode_height_tile(tile, 2, codec), 2, static_cast<int>(codec)).ok());
+            }
+}
+
+TEST(HeightCodec, ATileDecodedIntoAnUsedOneKeepsNothingOfIt) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    HeightTile reused;
+    for (int k = 0; k < 300; ++k) {
+        const int n = test::uniform(random, kMinTileCellsLog2, 5);
+        const HeightTile tile = random_tile(random, n, 1000);
+        const HeightCodec codec = kCodecs[k % 2];
+        auto bytes = encode_height_tile(tile, n, codec);
+        ASSERT_TRUE(decode_height_tile(bytes, n, static_cast<int>(codec), reused).ok());
+        ASSERT_EQ(reused, tile);
+        bytes.resize(bytes.size() / 2);
+        ASSERT_FALSE(decode_height_tile(bytes, n, static_cast<int>(codec), reused).ok());
+    }
+}
+
 TEST(HeightCodec, ExtremesAlternatingFromSampleToSampleComeBackExactly) {
     for (int n = kMinTileCellsLog2; n <= kMaxTileCellsLog2; ++n) {
         HeightTile tile;

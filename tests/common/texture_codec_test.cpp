@@ -46,6 +46,20 @@ TEST(TextureCodec, RandomTilesComeBackExactly) {
     }
 }
 
+TEST(TextureCodec, ATileDecodedIntoAnUsedOneKeepsNothingOfIt) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    TextureTile reused;
+    for (int k = 0; k < 40; ++k) {
+        const int log2 = test::uniform(random, kMinTextureSizeLog2, 8);
+        const TextureTile tile = random_tile(random, log2, k % 3 != 0);
+        const TextureCodec codec = kCodecs[k % 2];
+        const auto bytes = encode_texture_tile(tile, log2, codec);
+        ASSERT_TRUE(decode_texture_tile(bytes, log2, static_cast<int>(codec), reused).ok());
+        ASSERT_EQ(reused, tile);
+    }
+}
+
 TEST(TextureCodec, EveryTruncatedPrefixIsRefused) {
     test::Random random(1);
     const TextureTile tile = random_tile(random, 4, true);

@@ -5,6 +5,7 @@
 
 #include <map>
 #include <set>
+#include <thread>
 
 #include "tests/runtime/lod/memory_store.h"
 #include "tests/runtime/paging/tile_planner.h"
@@ -595,6 +596,19 @@ TEST_F(PagerRules, APrefetchThatIsAskedForInEarnestIsPromotedWhereItIs) {
         EXPECT_EQ(pager_->counters().prefetched, 0);
         EXPECT_EQ(reads(), 3) << "it is not read twice";
     }
+}
+
+TEST_F(PagerRules, APrefetchedTileThatWaitsToBeTakenIsTakenFirstOnceItIsAskedForInEarnest) {
+    open(8, 16);
+    const auto staged = [&] { return pager_->loader_counters(TileKind::height).tiles - 1; };  // the root is taken
+    request({want(child(1), 5, true)});
+    while (staged() < 1) std::this_thread::yield();
+    request({want(child(1), 5, true), want(child(2), 4)});
+    while (staged() < 2) std::this_thread::yield();
+    request({want(child(1), 5), want(child(2), 4)});
+    EXPECT_EQ(pager_->take_arrivals(1, false), 1);
+    EXPECT_GE(slot(child(1)), 0);
+    EXPECT_EQ(slot(child(2)), kNotResident);
 }
 
 TEST_F(PagerRules, NoCallOfTheFrameLoopWaitsForAHeldUpStore) {
