@@ -435,4 +435,26 @@ FrameTimes Renderer::draw(const Camera& camera, std::span<const DrawItem> items,
     return times;
 }
 
+std::uint32_t Renderer::warm_up(const FrameSettings& settings, RenderTarget& target) {
+    Camera camera;
+    camera.width_px = target.width_px();
+    camera.height_px = target.height_px();
+    std::uint32_t programs = 0;
+    const auto draw_one = [&](float share, int neighbour_arrays) {
+        DrawItem item;
+        item.geomip = state_->options.lattice.tile_cells_log2 - 1;  // too coarse for a ring: one draw
+        item.texture_share = share;
+        for (int array = 0; array < neighbour_arrays; ++array)
+            item.neighbour_textures[static_cast<std::size_t>(array)] = array * state_->textures.layers_per_array();
+        programs += draw(camera, {&item, 1}, settings, target).multi_draws;
+    };
+    draw_one(1, 0);     // plain
+    draw_one(1, 1);     // bordered
+    draw_one(0.5f, 0);  // faded
+    draw_one(0.5f, 1);  // blended
+    if (state_->bound_arrays > 2) draw_one(1, 3);
+    glFinish();
+    return programs;
+}
+
 }  // namespace scree

@@ -86,6 +86,11 @@ public:
     FrameTimes draw(const Camera& camera, std::span<const DrawItem> items, const FrameSettings& settings,
                     RenderTarget& target);
 
+    /// Draws into `target` once with every program that frames of these settings may need; returns how many. Drivers
+    /// that compile at the first draw (software OpenGL: up to half a second, unless it kept the result of an earlier
+    /// run) then do so now and not in mid-flight. What it draws means nothing.
+    std::uint32_t warm_up(const FrameSettings& settings, RenderTarget& target);
+
 private:
     struct State;
     explicit Renderer(std::unique_ptr<State> state);
