@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cassert>
 #include <chrono>
 #include <cmath>
@@ -338,7 +339,10 @@ void Renderer::State::draw_terrain(const Camera& camera, const FrameSettings& se
                               static_cast<GLintptr>(region.blends_offset), sizeof(BlendAttributes));
     glBindBuffer(GL_DRAW_INDIRECT_BUFFER, stream.buffer());
     glPolygonMode(GL_FRONT_AND_BACK, settings.wireframe ? GL_LINE : GL_FILL);
-    for (const DrawBatch& batch : batches.batches()) draw_batch(batch, settings, region);
+    for (const DrawBatch& batch : batches.batches()) {
+        draw_batch(batch, settings, region);
+        times.imagery_kinds |= 1u << static_cast<unsigned>(batch.imagery);
+    }
     glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
     times.multi_draws = static_cast<std::uint32_t>(batches.batches().size());
     times.blended_draws = static_cast<std::uint32_t>(batches.blended_draws());
@@ -439,14 +443,14 @@ std::uint32_t Renderer::warm_up(const FrameSettings& settings, RenderTarget& tar
     Camera camera;
     camera.width_px = target.width_px();
     camera.height_px = target.height_px();
-    std::uint32_t programs = 0;
+    std::uint32_t kinds = 0;
     const auto draw_one = [&](float share, int neighbour_arrays) {
         DrawItem item;
         item.geomip = state_->options.lattice.tile_cells_log2 - 1;  // too coarse for a ring: one draw
         item.texture_share = share;
         for (int array = 0; array < neighbour_arrays; ++array)
             item.neighbour_textures[static_cast<std::size_t>(array)] = array * state_->textures.layers_per_array();
-        programs += draw(camera, {&item, 1}, settings, target).multi_draws;
+        kinds |= draw(camera, {&item, 1}, settings, target).imagery_kinds;
     };
     draw_one(1, 0);     // plain
     draw_one(1, 1);     // bordered
@@ -454,7 +458,7 @@ std::uint32_t Renderer::warm_up(const FrameSettings& settings, RenderTarget& tar
     draw_one(0.5f, 1);  // blended
     if (state_->bound_arrays > 2) draw_one(1, 3);
     glFinish();
-    return programs;
+    return static_cast<std::uint32_t>(std::popcount(kinds));
 }
 
 }  // namespace scree

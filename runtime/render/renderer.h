@@ -64,6 +64,7 @@ struct FrameTimes {
     std::uint32_t draws = 0;
     std::uint32_t blended_draws = 0;  ///< those that look at several textures: fading in, or filtered over a border
     std::uint32_t multi_draws = 0;
+    std::uint32_t imagery_kinds = 0;  ///< bits: the Imagery of the draws, a program each
     std::uint64_t triangles = 0;
     double submitted_ms = 0;  ///< wall time of draw() without waiting
     double finished_ms = 0;   ///< wall time with waiting; 0 without wait_until_drawn
