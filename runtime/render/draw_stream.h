@@ -40,7 +40,7 @@ struct DrawAttributes {
 };
 static_assert(sizeof(DrawAttributes) == 60);
 
-/// A texture that a blended draw looks at besides its own: layer | kInOtherArray, or kNoTexture.
+/// A texture that a blended draw looks at: unit << kTextureLayerBits | layer, or kNoTexture.
 using TextureCode = std::uint16_t;
 
 /// The further attributes of a blended draw, kCoarseAttribute to kNeighboursAttribute.
@@ -49,10 +49,10 @@ struct BlendAttributes {
     float coarse_offset_u = 0;
     float coarse_offset_v = 0;
     float texture_share = 1;
-    std::uint32_t coarse = 0;                 ///< a TextureCode
+    std::uint32_t own = 0, coarse = 0;        ///< TextureCodes
     std::array<TextureCode, 8> neighbours{};  ///< in TextureSide's order
 };
-static_assert(sizeof(BlendAttributes) == 36);
+static_assert(sizeof(BlendAttributes) == 40);
 
 class DrawStream {
 public:

@@ -72,16 +72,27 @@ std::vector<std::string> terrain_vertex_sources(int tile_cells_log2, Imagery ima
             std::string(terrain_vert)};
 }
 
-Result<ProgramHandle> build_terrain_program(const TerrainVariant& variant) {
+std::vector<std::string> terrain_fragment_sources(const TerrainVariant& variant) {
     using namespace shader_source;
+    const bool fading = variant.imagery == Imagery::blended || variant.imagery == Imagery::blended_of_all;
+    const int arrays = variant.imagery == Imagery::blended_of_all ? variant.all_arrays : fading ? 2 : 1;
+    return {std::string(shared_constants),
+            with_bool("kWithHaze", variant.with_haze),
+            with_bool("kColourByLevel", variant.colour_by_level),
+            with_bool("kFading", fading),
+            fmt::format("const int kArrays = {};\nconst float kTextureTexels = {}.0;\n", arrays,
+                        1 << variant.texture_size_log2),
+            std::string(variant.imagery == Imagery::plain   ? imagery_plain
+                        : variant.imagery == Imagery::faded ? imagery_faded
+                                                            : imagery_blended),
+            std::string(atmosphere),
+            std::string(terrain_frag)};
+}
+
+Result<ProgramHandle> build_terrain_program(const TerrainVariant& variant) {
     return build_program({"terrain",
                           terrain_vertex_sources(variant.tile_cells_log2, variant.imagery),
-                          {std::string(shared_constants), with_bool("kWithHaze", variant.with_haze),
-                           with_bool("kColourByLevel", variant.colour_by_level),
-                           with_bool("kTwoArrays", variant.imagery == Imagery::blended_of_two_arrays),
-                           fmt::format("const float kTextureTexels = {}.0;\n", 1 << variant.texture_size_log2),
-                           std::string(variant.imagery == Imagery::plain ? imagery_plain : imagery_blended),
-                           std::string(atmosphere), std::string(terrain_frag)},
+                          terrain_fragment_sources(variant),
                           {}});
 }
 

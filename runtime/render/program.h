@@ -2,25 +2,22 @@
 // carry the compiler's log; a shader that does not compile on a driver is a defect here or there, never the user's.
 #pragma once
 
-#include <cstddef>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "common/result.h"
+#include "runtime/render/draw_batches.h"
 #include "runtime/render/gl_handle.h"
 
 namespace scree {
-
-/// What the draws of a program look at: one texture; several of one array; several of two arrays.
-enum class Imagery { plain, blended, blended_of_two_arrays };
-inline constexpr std::size_t kImageryKinds = 3;
 
 struct TerrainVariant {
     int tile_cells_log2 = 5;
     int texture_size_log2 = 8;
     Imagery imagery = Imagery::plain;
+    int all_arrays = 1;  ///< that Imagery::blended_of_all has bound
     bool with_haze = false;
     bool colour_by_level = false;
 };

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cassert>
 #include <chrono>
 #include <cmath>
@@ -36,16 +37,58 @@ double ms_since(Clock::time_point start) {
     return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-/// All patterns' indices in one buffer. They are local to a tile, so 16 bits serve up to m = 128.
+/// Where the shapes of an item's draws lie in the index arena: its blocks, or only those at the tile's border, or only
+/// the others.
+class DrawPatterns {
+public:
+    explicit DrawPatterns(int tile_cells_log2);
+    PatternRange range(const DrawItem& item, DrawShape shape) const {
+        if (shape == DrawShape::whole) return patterns_.range(item.geomip, item.edge_mask, item.part);
+        const auto geomip = static_cast<std::size_t>(item.geomip);
+        return shape == DrawShape::inner ? inner_[geomip] : rings_[geomip * kEdgeMaskCount + item.edge_mask];
+    }
+    const std::vector<std::uint32_t>& indices() const { return indices_; }
+
+private:
+    /// Appends the blocks that lie at the tile's border, or the others.
+    PatternRange append_blocks(int geomip, unsigned mask, bool at_border);
+
+    TilePatterns patterns_;
+    std::vector<std::uint32_t> indices_;  ///< the patterns', then those of inner blocks and rings
+    std::vector<PatternRange> inner_;     ///< [geomip]: no edge to thin
+    std::vector<PatternRange> rings_;     ///< [geomip][edge mask]
+};
+
+DrawPatterns::DrawPatterns(int tile_cells_log2) : patterns_(tile_cells_log2), indices_(patterns_.indices()) {
+    for (int geomip = 0; geomip < patterns_.geomip_levels(); ++geomip) {
+        inner_.push_back(append_blocks(geomip, 0, false));
+        for (unsigned mask = 0; mask < kEdgeMaskCount; ++mask) rings_.push_back(append_blocks(geomip, mask, true));
+    }
+}
+
+PatternRange DrawPatterns::append_blocks(int geomip, unsigned mask, bool at_border) {
+    const int level = patterns_.finest_part_level(geomip), last = (1 << level) - 1;
+    const auto first = static_cast<std::uint32_t>(indices_.size());
+    for (int y = 0; y <= last; ++y)
+        for (int x = 0; x <= last; ++x) {
+            if ((x == 0 || y == 0 || x == last || y == last) != at_border) continue;
+            const PatternRange block = patterns_.range(geomip, mask, {level, x, y});
+            const auto from = patterns_.indices().begin() + block.first;
+            indices_.insert(indices_.end(), from, from + block.count);
+        }
+    return {first, static_cast<std::uint32_t>(indices_.size()) - first};
+}
+
+/// All indices in one buffer. They are local to a tile, so 16 bits serve up to m = 128.
 struct IndexArena {
     BufferHandle buffer;
-    TilePatterns patterns{1};  ///< where each pattern and part lies in the buffer
+    DrawPatterns patterns{1};
     GLenum type = GL_UNSIGNED_SHORT;
 };
 
 IndexArena make_index_arena(int tile_cells_log2) {
-    IndexArena arena{{}, TilePatterns(tile_cells_log2)};
-    const TilePatterns& patterns = arena.patterns;
+    IndexArena arena{{}, DrawPatterns(tile_cells_log2)};
+    const std::vector<std::uint32_t>& all = arena.patterns.indices();
     GLuint name = 0;
     glCreateBuffers(1, &name);
     arena.buffer = BufferHandle(name);
@@ -55,12 +98,12 @@ IndexArena make_index_arena(int tile_cells_log2) {
     const int samples = (1 << tile_cells_log2) + 1;
     if (samples * samples <= 65535) {
         std::vector<std::uint16_t> small;
-        small.reserve(patterns.indices().size());
-        for (const std::uint32_t index : patterns.indices()) small.push_back(static_cast<std::uint16_t>(index));
+        small.reserve(all.size());
+        for (const std::uint32_t index : all) small.push_back(static_cast<std::uint16_t>(index));
         store(small);
     } else {
         arena.type = GL_UNSIGNED_INT;
-        store(patterns.indices());
+        store(all);
     }
     return arena;
 }
@@ -99,8 +142,7 @@ VertexArrayHandle make_vertex_array(const VertexArena& vertices, const IndexAren
     formats.floats(shader::kEdgeMorphAttribute, kDrawBinding, 4, offsetof(DrawAttributes, edge_morph));
     if (blended) {
         formats.floats(shader::kCoarseAttribute, kBlendBinding, 4, offsetof(BlendAttributes, coarse_scale));
-        formats.integers(shader::kCoarseCodeAttribute, kBlendBinding, 1, GL_UNSIGNED_INT,
-                         offsetof(BlendAttributes, coarse));
+        formats.integers(shader::kCodesAttribute, kBlendBinding, 2, GL_UNSIGNED_INT, offsetof(BlendAttributes, own));
         formats.integers(shader::kNeighboursAttribute, kBlendBinding, 4, GL_UNSIGNED_INT,
                          offsetof(BlendAttributes, neighbours));
         glVertexArrayBindingDivisor(name, kBlendBinding, 1);
@@ -109,6 +151,10 @@ VertexArrayHandle make_vertex_array(const VertexArena& vertices, const IndexAren
     glVertexArrayVertexBuffer(name, kVertexBinding, vertices.buffer(), 0, sizeof(SlotVertex));
     glVertexArrayElementBuffer(name, indices.buffer.name());
     return VertexArrayHandle(name);
+}
+
+std::size_t look_of(const FrameSettings& settings) {
+    return (settings.haze_distance_m > 0 ? 1u : 0u) + (settings.colour_by_level ? 2u : 0u);
 }
 
 /// Columns that take {x, y, 1} on the screen to a view ray.
@@ -156,14 +202,18 @@ struct Renderer::State {
     ProgramHandle sky;
     std::array<std::array<ProgramHandle, 4>, kImageryKinds> terrain;  ///< [imagery][haze + 2 * colour by level]
 
+    int bound_arrays = 1;  ///< by Imagery::blended_of_all
+
     Result<void> build_programs();
-    /// Writes the draws to the region, batch by batch; returns their triangles.
+    /// Sorts the draws into batches and writes them to the region; returns their triangles.
     std::uint64_t write_draws(std::span<const DrawItem> items, const DrawStream::Region& region);
     DrawAttributes attributes_of(const DrawItem& item) const;
     BlendAttributes blend_of(const DrawItem& item, const DrawBatch& batch) const;
-    TextureCode texture_code(std::int32_t slot, const DrawBatch& batch) const;
+    /// kNoTexture for what is in no array that the batch has bound.
+    TextureCode texture_code(std::int32_t slot, const DrawBatch& batch, bool coarse = false) const;
     void draw_terrain(const Camera& camera, const FrameSettings& settings, const DrawStream::Region& region,
                       FrameTimes& times);
+    void bind_textures(const DrawBatch& batch) const;
     void draw_batch(const DrawBatch& batch, const FrameSettings& settings, const DrawStream::Region& region) const;
     void draw_sky(const Camera& camera, const FrameSettings& settings);
 };
@@ -174,8 +224,9 @@ Result<void> Renderer::State::build_programs() {
     sky = std::move(*built);
     for (std::size_t imagery = 0; imagery < kImageryKinds; ++imagery) {
         for (std::size_t look = 0; look < terrain[imagery].size(); ++look) {
-            built = build_terrain_program({options.lattice.tile_cells_log2, options.texture_size_log2,
-                                           static_cast<Imagery>(imagery), (look & 1) != 0, (look & 2) != 0});
+            built =
+                build_terrain_program({options.lattice.tile_cells_log2, options.texture_size_log2,
+                                       static_cast<Imagery>(imagery), bound_arrays, (look & 1) != 0, (look & 2) != 0});
             if (!built) return built.error();
             terrain[imagery][look] = std::move(*built);
         }
@@ -202,14 +253,18 @@ DrawAttributes Renderer::State::attributes_of(const DrawItem& item) const {
             item.edge_morph};
 }
 
-TextureCode Renderer::State::texture_code(std::int32_t slot, const DrawBatch& batch) const {
+TextureCode Renderer::State::texture_code(std::int32_t slot, const DrawBatch& batch, bool coarse) const {
     static_assert(kMaxArrayLayers <= shader::kTextureLayerMask + 1);
     assert(slot < textures.slots());
     if (slot < 0) return shader::kNoTexture;
-    const int array = textures.array_of(slot), layer = textures.layer_of(slot);
-    if (array == batch.array) return static_cast<TextureCode>(layer);
-    if (array == batch.other_array) return static_cast<TextureCode>(layer | shader::kInOtherArray);
-    return shader::kNoTexture;
+    const int array = textures.array_of(slot);
+    int unit = array;
+    if (batch.imagery != Imagery::blended_of_all) {
+        if (array != batch.arrays[0] && array != batch.arrays[1]) return shader::kNoTexture;
+        // Of two arrays each costs a tap on software OpenGL: a coarse texture takes the second one if it can.
+        unit = array != batch.arrays[0] || (coarse && array == batch.arrays[1]) ? 1 : 0;
+    }
+    return static_cast<TextureCode>(unit << shader::kTextureLayerBits | textures.layer_of(slot));
 }
 
 BlendAttributes Renderer::State::blend_of(const DrawItem& item, const DrawBatch& batch) const {
@@ -219,7 +274,8 @@ BlendAttributes Renderer::State::blend_of(const DrawItem& item, const DrawBatch&
     blend.coarse_offset_u = coarse.offset_u;
     blend.coarse_offset_v = coarse.offset_v;
     blend.texture_share = std::min(item.texture_share, 1.0f);
-    blend.coarse = texture_code(coarse.slot, batch);
+    blend.own = texture_code(item.texture.slot, batch);
+    blend.coarse = texture_code(coarse.slot, batch, true);
     for (std::size_t side = 0; side < blend.neighbours.size(); ++side)
         blend.neighbours[side] = texture_code(item.neighbour_textures[side], batch);
     return blend;
@@ -228,33 +284,39 @@ BlendAttributes Renderer::State::blend_of(const DrawItem& item, const DrawBatch&
 std::uint64_t Renderer::State::write_draws(std::span<const DrawItem> items, const DrawStream::Region& region) {
     batches.sort(items);
     std::uint64_t triangles = 0;
-    for (std::size_t k = 0; k < items.size(); ++k) {
-        const DrawItem& item = items[k];
-        const DrawBatch& batch = batches.batch_of(k);
-        const std::size_t draw = batches.place_of(k);
-        const PatternRange pattern = indices.patterns.range(item.geomip, item.edge_mask, item.part);
+    for (std::size_t draw = 0; draw < batches.draws().size(); ++draw) {
+        const SortedDraw& sorted = batches.draws()[draw];
+        const DrawItem& item = items[sorted.item];
+        const DrawBatch& batch = batches.batches()[sorted.batch];
+        const PatternRange pattern = indices.patterns.range(item, sorted.shape);
         region.attributes[draw] = attributes_of(item);
         region.commands[draw] = {pattern.count, 1, pattern.first, item.height_slot * vertices.slot_vertices(),
                                  static_cast<std::uint32_t>(draw)};
-        if (batch.blended) region.blends[draw] = blend_of(item, batch);
+        if (batch.imagery != Imagery::plain) region.blends[draw] = blend_of(item, batch);
         triangles += pattern.count / 3;
     }
     return triangles;
 }
 
+void Renderer::State::bind_textures(const DrawBatch& batch) const {
+    const auto bind = [this](int unit, int array) {
+        glBindTextureUnit(static_cast<GLuint>(shader::kImageryTextureUnit + unit),
+                          textures.arrays()[static_cast<std::size_t>(array)].name());
+    };
+    if (batch.imagery == Imagery::blended_of_all) {
+        for (int array = 0; array < bound_arrays; ++array) bind(array, array);
+        return;
+    }
+    bind(0, batch.arrays[0]);
+    bind(1, batch.arrays[1]);
+}
+
 void Renderer::State::draw_batch(const DrawBatch& batch, const FrameSettings& settings,
                                  const DrawStream::Region& region) const {
-    const std::size_t look = (settings.haze_distance_m > 0 ? 1u : 0u) + (settings.colour_by_level ? 2u : 0u);
-    const Imagery imagery = !batch.blended                     ? Imagery::plain
-                            : batch.array == batch.other_array ? Imagery::blended
-                                                               : Imagery::blended_of_two_arrays;
-    const auto bind = [this](int unit, int array) {
-        glBindTextureUnit(static_cast<GLuint>(unit), textures.arrays()[static_cast<std::size_t>(array)].name());
-    };
-    glUseProgram(terrain[static_cast<std::size_t>(imagery)][look].name());
-    glBindVertexArray(batch.blended ? blended_array.name() : plain_array.name());
-    bind(shader::kImageryTextureUnit, batch.array);
-    if (batch.blended) bind(shader::kOtherImageryTextureUnit, batch.other_array);
+    const bool plain = batch.imagery == Imagery::plain;
+    glUseProgram(terrain[static_cast<std::size_t>(batch.imagery)][look_of(settings)].name());
+    glBindVertexArray(plain ? plain_array.name() : blended_array.name());
+    bind_textures(batch);
     glMultiDrawElementsIndirect(
         GL_TRIANGLES, indices.type,
         reinterpret_cast<const void*>(region.commands_offset + batch.first * sizeof(DrawCommand)),
@@ -265,7 +327,7 @@ void Renderer::State::draw_terrain(const Camera& camera, const FrameSettings& se
                                    const DrawStream::Region& region, FrameTimes& times) {
     const RelativeFrame frame = make_relative_frame(options.lattice, options.height_offset_m, options.height_quantum_m,
                                                     camera.eye, settings.half_curvature);
-    const std::size_t look = (settings.haze_distance_m > 0 ? 1u : 0u) + (settings.colour_by_level ? 2u : 0u);
+    const std::size_t look = look_of(settings);
     for (const auto& kind : terrain) {
         set_position(kind[look].name(), camera, frame);
         set_atmosphere(kind[look].name(), camera, settings);
@@ -277,7 +339,10 @@ void Renderer::State::draw_terrain(const Camera& camera, const FrameSettings& se
                               static_cast<GLintptr>(region.blends_offset), sizeof(BlendAttributes));
     glBindBuffer(GL_DRAW_INDIRECT_BUFFER, stream.buffer());
     glPolygonMode(GL_FRONT_AND_BACK, settings.wireframe ? GL_LINE : GL_FILL);
-    for (const DrawBatch& batch : batches.batches()) draw_batch(batch, settings, region);
+    for (const DrawBatch& batch : batches.batches()) {
+        draw_batch(batch, settings, region);
+        times.imagery_kinds |= 1u << static_cast<unsigned>(batch.imagery);
+    }
     glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
     times.multi_draws = static_cast<std::uint32_t>(batches.batches().size());
     times.blended_draws = static_cast<std::uint32_t>(batches.blended_draws());
@@ -307,10 +372,16 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const RendererOptions& option
         {options.texture_size_log2, options.texture_slots, options.anisotropy, options.max_array_layers});
     if (!textures) return textures.error();
     state->textures = std::move(*textures);
-    auto stream = DrawStream::create(options.max_draws);
+    auto stream = DrawStream::create(2 * options.max_draws);
     if (!stream) return stream.error();
     state->stream = std::move(*stream);
 
+    GLint units = 0;
+    glGetIntegerv(GL_MAX_TEXTURE_IMAGE_UNITS, &units);
+    const auto arrays = static_cast<int>(state->textures.arrays().size());
+    state->bound_arrays = std::min({arrays, static_cast<int>(units), shader::kMaxBlendedArrays});
+    state->batches = DrawBatches({arrays, state->textures.layers_per_array(), state->bound_arrays, tile_cells_log2,
+                                  options.texture_size_log2, options.max_draws});
     if (const auto built = state->build_programs(); !built) return built.error();
     state->indices = make_index_arena(tile_cells_log2);
     state->plain_array = make_vertex_array(state->vertices, state->indices, false);
@@ -318,8 +389,6 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const RendererOptions& option
     GLuint empty = 0;
     glCreateVertexArrays(1, &empty);
     state->sky_array = VertexArrayHandle(empty);
-    state->batches = DrawBatches(static_cast<int>(state->textures.arrays().size()), state->textures.layers_per_array(),
-                                 options.max_draws);
     if (glGetError() != GL_NO_ERROR)
         return Error{ErrorCode::display, "OpenGL has no memory for the index lists of this tile size"};
     return std::unique_ptr<Renderer>(new Renderer(std::move(state)));
@@ -334,14 +403,14 @@ void Renderer::upload_texture(int slot, std::span<const std::uint8_t> chain) { s
 FrameTimes Renderer::draw(const Camera& camera, std::span<const DrawItem> items, const FrameSettings& settings,
                           RenderTarget& target) {
     assert(camera.width_px == target.width_px() && camera.height_px == target.height_px());
-    assert(items.size() <= static_cast<std::size_t>(state_->stream.max_draws()));
+    assert(items.size() <= static_cast<std::size_t>(state_->options.max_draws));
     const Clock::time_point start = Clock::now();
     FrameTimes times;
-    items = items.first(std::min(items.size(), static_cast<std::size_t>(state_->stream.max_draws())));
+    items = items.first(std::min(items.size(), static_cast<std::size_t>(state_->options.max_draws)));
 
     const DrawStream::Region region = state_->stream.begin_frame();
-    times.draws = static_cast<std::uint32_t>(items.size());
     times.triangles = state_->write_draws(items, region);
+    times.draws = static_cast<std::uint32_t>(state_->batches.draws().size());
 
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, target.framebuffer());
     glViewport(0, 0, target.width_px(), target.height_px());
@@ -368,6 +437,28 @@ FrameTimes Renderer::draw(const Camera& camera, std::span<const DrawItem> items,
         times.finished_ms = ms_since(start);
     }
     return times;
+}
+
+std::uint32_t Renderer::warm_up(const FrameSettings& settings, RenderTarget& target) {
+    Camera camera;
+    camera.width_px = target.width_px();
+    camera.height_px = target.height_px();
+    std::uint32_t kinds = 0;
+    const auto draw_one = [&](float share, int neighbour_arrays) {
+        DrawItem item;
+        item.geomip = state_->options.lattice.tile_cells_log2 - 1;  // too coarse for a ring: one draw
+        item.texture_share = share;
+        for (int array = 0; array < neighbour_arrays; ++array)
+            item.neighbour_textures[static_cast<std::size_t>(array)] = array * state_->textures.layers_per_array();
+        kinds |= draw(camera, {&item, 1}, settings, target).imagery_kinds;
+    };
+    draw_one(1, 0);     // plain
+    draw_one(1, 1);     // bordered
+    draw_one(0.5f, 0);  // faded
+    draw_one(0.5f, 1);  // blended
+    if (state_->bound_arrays > 2) draw_one(1, 3);
+    glFinish();
+    return static_cast<std::uint32_t>(std::popcount(kinds));
 }
 
 }  // namespace scree

@@ -29,7 +29,7 @@ struct RendererOptions {
     /// it is taken at once.
     int height_slots = 1;
     int texture_slots = 1;
-    /// Draws a frame at most. 116 bytes each, three times.
+    /// Items a frame at most. Each may be two draws, of 120 bytes each, three times.
     int max_draws = 4096;
     /// 1: off; up to 16: sharper imagery at grazing angles; costs 5 to 6 ms at 800x800 on software OpenGL.
     double anisotropy = 1;
@@ -62,8 +62,9 @@ struct FrameSettings {
 
 struct FrameTimes {
     std::uint32_t draws = 0;
-    std::uint32_t blended_draws = 0;  ///< those that look at several textures: fading in, or magnified up to a border
+    std::uint32_t blended_draws = 0;  ///< those that look at several textures: fading in, or filtered over a border
     std::uint32_t multi_draws = 0;
+    std::uint32_t imagery_kinds = 0;  ///< bits: the Imagery of the draws, a program each
     std::uint64_t triangles = 0;
     double submitted_ms = 0;  ///< wall time of draw() without waiting
     double finished_ms = 0;   ///< wall time with waiting; 0 without wait_until_drawn
@@ -85,6 +86,11 @@ public:
     /// target's.
     FrameTimes draw(const Camera& camera, std::span<const DrawItem> items, const FrameSettings& settings,
                     RenderTarget& target);
+
+    /// Draws into `target` once with every program that frames of these settings may need; returns how many. Drivers
+    /// that compile at the first draw (software OpenGL: up to half a second, unless it kept the result of an earlier
+    /// run) then do so now and not in mid-flight. What it draws means nothing.
+    std::uint32_t warm_up(const FrameSettings& settings, RenderTarget& target);
 
 private:
     struct State;

@@ -10,6 +10,7 @@ extern const std::string_view shared_constants;
 extern const std::string_view terrain_position;
 extern const std::string_view terrain_morph;
 extern const std::string_view imagery_plain;
+extern const std::string_view imagery_faded;
 extern const std::string_view imagery_blended;
 extern const std::string_view atmosphere;
 extern const std::string_view terrain_vert;

@@ -14,7 +14,7 @@
 namespace scree {
 
 /// Layers of one array at most. 2048 layers of 256^2 texels are 90 MB: large budgets need a handful of arrays, and each
-/// array is one multi-draw. Below this the smaller of the driver's limit and this holds. A TextureCode has 14 bits for
+/// array is one multi-draw. Below this the smaller of the driver's limit and this holds. A TextureCode has 11 bits for
 /// a layer.
 inline constexpr int kMaxArrayLayers = 2048;
 

@@ -1,4 +1,4 @@
-// Imagery of a draw with one texture; see imagery_blended.glsl for the other kind.
+// Imagery of a draw with one texture; see imagery_faded.glsl and imagery_blended.glsl for others.
 layout(binding = kImageryTextureUnit) uniform sampler2DArray imagery;
 
 in vec2 texture_position;

@@ -8,13 +8,14 @@ const int kPatternAttribute = 3;     // ivec2: samples between vertices, edges t
 const int kMorphAttribute = 4;       // float: weight of inner vertices
 const int kEdgeMorphAttribute = 5;   // vec4: weights of the north, east, south and west edge's vertices
 const int kCoarseAttribute = 6;      // vec4: scale, offset u, offset v of the coarse texture, share of the own one
-const int kCoarseCodeAttribute = 7;  // uint: which texture the coarse one is
-const int kNeighboursAttribute = 8;  // uvec4: the textures round the own one, two to a word, by TextureSide
+const int kCodesAttribute = 7;       // uvec2: texture codes of the own and of the coarse texture
+const int kNeighboursAttribute = 8;  // uvec4: codes of the textures round the own one, two to a word, by TextureSide
 
-// How 16 bits name a texture of a blended draw: a layer of its own array or of the other one it is drawn with.
-const int kInOtherArray = 0x4000;
-const int kTextureLayerMask = 0x3fff;
-const int kNoTexture = 0x8000;
+// How 16 bits name a texture of a blended draw: the unit that its array is bound to, then its layer there.
+const int kTextureLayerBits = 11;
+const int kTextureLayerMask = 0x7ff;
+const int kNoTexture = 0xffff;
+const int kMaxBlendedArrays = 31;
 
 // Uniform locations.
 const int kClipFromRelativeUniform = 0;  // mat4
@@ -27,5 +28,4 @@ const int kHazeUniform = 6;              // vec4: see atmosphere.glsl
 const int kRayFromScreenUniform = 7;     // mat3: {x, y, 1} on the screen, -1..1, to a view ray (not normalised)
 const int kHalfCurvatureUniform = 8;     // float: 1 / (2 R), 1/m; 0: flat
 
-const int kImageryTextureUnit = 0;
-const int kOtherImageryTextureUnit = 1;  // blended draws only
+const int kImageryTextureUnit = 0;  // and those after it, in blended draws

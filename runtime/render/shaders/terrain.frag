@@ -1,4 +1,4 @@
-// Imagery (imagery_texel(), of one of two files), then haze. kWithHaze and kColourByLevel are set when the program is
+// Imagery (imagery_texel(), of one of three files), then haze. kWithHaze and kColourByLevel are set when the program is
 // built.
 in vec3 relative_m;
 in float haze_density;

@@ -6,19 +6,24 @@ layout(location = kTextureAttribute) in vec4 placement;
 
 layout(location = kClipFromRelativeUniform) uniform mat4 clip_from_relative;
 
+// Programs meet along edges of tiles and within them: all must come to the same bits.
+invariant gl_Position;
+
 out vec3 relative_m;
 out float haze_density;  // mean over the ray; so nearly linear over a triangle that it need not be worked out per pixel
 out vec2 texture_position;
-flat out float texture_layer;
 flat out int tile_step;
 
-#ifdef SCREE_BLENDED
+#ifndef SCREE_BLENDED
+flat out float texture_layer;
+#else
 layout(location = kCoarseAttribute) in vec4 coarse;
-layout(location = kCoarseCodeAttribute) in uint coarse_code;
+layout(location = kCodesAttribute) in uvec2 codes;
 layout(location = kNeighboursAttribute) in uvec4 neighbours;
 
 out vec2 coarse_position;
 flat out float texture_share;
+flat out uint own_texture;
 flat out uint coarse_texture;
 flat out uvec4 neighbour_textures;
 #endif
@@ -32,12 +37,14 @@ void main() {
     haze_density = mean_haze_density(flat_m.z);  // air follows the curve of the ground
     vec2 tile_position = vec2(sample_index) / float(kTileCells);
     texture_position = placement.zw + placement.y * tile_position;
-    texture_layer = placement.x;
     tile_step = tile.z;
-#ifdef SCREE_BLENDED
+#ifndef SCREE_BLENDED
+    texture_layer = placement.x;
+#else
     coarse_position = coarse.yz + coarse.x * tile_position;
     texture_share = coarse.w;
-    coarse_texture = coarse_code;
+    own_texture = codes.x;
+    coarse_texture = codes.y;
     neighbour_textures = neighbours;
 #endif
     gl_Position = clip_from_relative * vec4(relative_m, 1.0);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -280,6 +281,74 @@ TEST_F(RendererTest, DepthIsOneAtTheNearPlaneAndZeroAtInfinity) {
     draw(from_above(1e4), {DrawItem{}}, bare());
     EXPECT_NEAR(depth_[middle] / 1e-5f, 1.0f, 1e-4f);
     EXPECT_EQ(depth_[0], 0.0f) << "beside the world";
+}
+
+// Vertices of 40 quanta on their way to 10, seen from above; the camera's place says which weight is to move them.
+TEST_F(RendererTest, VerticesMorphByTheWeightOfWhereTheyLie) {
+    make_small();
+    renderer_->upload_texture(0, plain_texture(kTextureLog2, kGreen565));
+    constexpr std::size_t kInner = 4;
+    struct Case {
+        int i, j, geomip;
+        unsigned edge_mask;
+        std::size_t moved_by;  ///< an edge, or kInner
+    };
+    for (const Case& c : {Case{9, 8, 0, 0, kInner}, Case{10, 8, 1, 0, kInner}, Case{10, 10, 1, 15, kInner},
+                          Case{9, 0, 0, 0, 0}, Case{16, 9, 0, 0, 1}, Case{9, 16, 0, 0, 2}, Case{0, 9, 0, 0, 3},
+                          Case{10, 0, 0, kEdgeNorth, 0}, Case{16, 12, 1, kEdgeEast, 1}}) {
+        std::vector<SlotVertex> slot = flat_slot(4, 0);
+        slot[static_cast<std::size_t>(c.j * 17 + c.i)] = {40, 10};
+        renderer_->upload_height(0, slot);
+        // A little inwards, so that the middle pixel sees the vertex's own tile.
+        const double x = 1000 + 20 * c.i + (c.i == 16 ? -0.02 : 0.02), y = 2000 - 20 * c.j + (c.j == 16 ? 0.02 : -0.02);
+        auto camera = look_at({x, y, 100}, {x, y, 0}, 0.5, kSize_px, kSize_px);
+        ASSERT_TRUE(camera.ok());
+        for (const std::size_t weight : {std::size_t{0}, std::size_t{1}, std::size_t{2}, std::size_t{3}, kInner})
+            for (const std::int32_t neighbour : {-1, 1}) {  // by either program
+                DrawItem item;
+                item.geomip = c.geomip;
+                item.edge_mask = c.edge_mask;
+                item.neighbour_textures[0] = neighbour;
+                (weight == kInner ? item.morph : item.edge_morph[weight]) = 0.25f;
+                draw(*camera, {item}, bare());
+                const double distance =
+                    camera->near_m / static_cast<double>(depth_[kSize_px / 2 * kSize_px + kSize_px / 2]);
+                EXPECT_NEAR(100 - distance, weight == c.moved_by ? 32.5 : 40, 0.2)
+                    << "vertex " << c.i << ", " << c.j << ", weight " << weight;
+            }
+    }
+}
+
+// On an earth of a tenth the radius a plain at the eye's feet ends at the horizon, sqrt(2 h / R) below the level.
+TEST_F(RendererTest, AFarPlainSinksBelowTheHorizon) {
+    RendererOptions options;
+    auto lattice = make_lattice(0, 0, 1000, 64, 64, 4);
+    ASSERT_TRUE(lattice.ok());
+    options.lattice = *lattice;
+    options.texture_size_log2 = kTextureLog2;
+    options.height_slots = 1;
+    make(options);
+    renderer_->upload_texture(0, plain_texture(kTextureLog2, kGreen565));
+    std::vector<DrawItem> items;
+    for (int quadrant = 0; quadrant < 16; ++quadrant) {
+        DrawItem item;
+        item.tile = {2, quadrant % 4, quadrant / 4};
+        items.push_back(item);
+    }
+    constexpr double kHeight_m = 1000, kRadius_m = 637'100, kFar_m = 64'000;
+    auto camera = look_at({32'000, -kFar_m, kHeight_m}, {32'000, 0, kHeight_m}, 20, kSize_px, kSize_px);
+    ASSERT_TRUE(camera.ok());
+    FrameSettings settings = bare();
+    const auto top_row = [&] {
+        const Picture picture = draw(*camera, items, settings);
+        int row = 0;
+        while (row < kSize_px && picture.at(kSize_px / 2, row) != kGreen) ++row;
+        return row;
+    };
+    const double half = kSize_px / 2.0;
+    EXPECT_NEAR(top_row(), half + camera->focal_px() * kHeight_m / kFar_m, 1);
+    settings.half_curvature = 0.5 / kRadius_m;
+    EXPECT_NEAR(top_row(), half + camera->focal_px() * std::sqrt(2 * kHeight_m / kRadius_m), 1);
 }
 
 TEST_F(RendererTest, NearerTilesHideFartherOnes) {

@@ -83,6 +83,64 @@ TEST(RelativeFrame, TilesThatShareAVertexPutItAtTheSameBits) {
     }
 }
 
+constexpr double kHalfCurvature = 0.5 / 6'371'000;  // 1/m
+
+TEST(RelativeFrame, CurvatureLowersByTheSquareOfTheDistanceOverTwiceTheRadius) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    for (int k = 0; k < 10000; ++k) {
+        const Lattice l = random_lattice(random);
+        const auto i = static_cast<std::int32_t>(test::uniform_real(random, 0, 1) * static_cast<double>(l.cells_x));
+        const auto j = static_cast<std::int32_t>(test::uniform_real(random, 0, 1) * static_cast<double>(l.cells_y));
+        const double away = std::exp(test::uniform_real(random, 0, 13));
+        const glm::dvec3 eye{l.x_m(i) + away * test::uniform_real(random, -1, 1),
+                             l.y_m(j) + away * test::uniform_real(random, -1, 1), 500};
+        const glm::vec3 flat = make_relative_frame(l, 0, 0.25, eye).position(i, j, 100);
+        const glm::vec3 curved = make_relative_frame(l, 0, 0.25, eye, kHalfCurvature).position(i, j, 100);
+        const double dx = l.x_m(i) - eye.x, dy = l.y_m(j) - eye.y, drop = (dx * dx + dy * dy) * kHalfCurvature;
+        ASSERT_EQ(flat.x, curved.x);
+        ASSERT_EQ(flat.y, curved.y);
+        ASSERT_NEAR(static_cast<double>(flat.z) - static_cast<double>(curved.z), drop, 3e-6 * drop + 1e-4);
+    }
+}
+
+// So that a tile that has morphed wholly and the coarser one that takes its place are the same surface, curved too.
+TEST(RelativeFrame, AWhollyMorphedVertexLiesBetweenItsNeighbours) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    auto lattice = make_lattice(300000, 2700000, 30, 5000, 5000, 5);
+    ASSERT_TRUE(lattice.ok());
+    for (int k = 0; k < 10000; ++k) {
+        const int geomip = test::uniform(random, 0, 2), step = 1 << test::uniform(random, 0, 3), d = step << geomip;
+        const int i = test::uniform(random, 0, 3) * 2 + 1, j = test::uniform(random, 0, 3) * 2 + 1;
+        const bool across = test::uniform(random, 0, 1) == 1;  // the middle of a cell, or else of an edge
+        const VertexMorph morph =
+            vertex_morph(i << geomip, (across ? j : j - 1) << geomip, 6, {geomip, 0, 1, {1, 1, 1, 1}});
+        ASSERT_EQ(morph.weight, 1);
+        const glm::dvec3 eye{lattice->x_m(test::uniform_real(random, -2e3, 7e3)), lattice->y_m(2500), 300};
+        const RelativeFrame frame = make_relative_frame(*lattice, 0, 0.25, eye, 1000 * kHalfCurvature);
+        const int at_i = 1000 + i * d, at_j = 1000 + (across ? j : j - 1) * d, dj = across ? d : 0;
+        const glm::dvec3 before = frame.position(at_i - d, at_j - dj, 0),
+                         after = frame.position(at_i + d, at_j + dj, 0);
+        const glm::dvec3 between = frame.position(at_i, at_j, 0, frame.morph_reach_m2(morph, step));
+        ASSERT_NEAR(between.z, 0.5 * (before.z + after.z), 1e-6 * std::abs(between.z) + 1e-4);
+    }
+}
+
+TEST(RelativeFrame, AReachComesToTheSameBitsFromTilesOfAnyStep) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    for (int k = 0; k < 10000; ++k) {
+        RelativeFrame frame;
+        frame.spacing_m = static_cast<float>(std::exp(test::uniform_real(random, -2, 5)));
+        const float weight = static_cast<float>(test::uniform_real(random, 0, 1));
+        const std::int64_t step = std::int64_t{1} << test::uniform(random, 0, 20);
+        ASSERT_EQ(std::bit_cast<std::uint32_t>(frame.morph_reach_m2({weight, 64}, step)),
+                  std::bit_cast<std::uint32_t>(frame.morph_reach_m2({weight, 16}, 2 * step)));
+        ASSERT_GT(frame.morph_reach_m2({1, 1}, step), 0);
+    }
+}
+
 // 9: the double path sees every motion of a tenth of a metre, and of a millimetre, in UTM.
 TEST(RelativeFrame, FollowsMotionsOfAMillimetreInUtm) {
     SCREE_TRACE_SEED();
