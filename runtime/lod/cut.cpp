@@ -219,6 +219,12 @@ bool Cut::try_split(std::int32_t index) {
     {
         const CutNode& node = nodes_[static_cast<std::size_t>(index)];
         if (node.slot < 0) return false;
+        if (std::find(held_.begin(), held_.end(), node.id) != held_.end()) return false;
+        // Still so coarse that its children could not be drawn like it.
+        if (node.floor > level_of(maximum_exponent(node) - 1)) {
+            needs_floors_ = growing_ = true;
+            return false;
+        }
         // Next to a page that can only be drawn too coarsely for the children there is nothing to be gained.
         const int coarsest_beside = node.id.level + 1 - lattice_.tile_cells_log2;
         for (int d = 0; d < 4 && coarsest_beside > 0; ++d)
@@ -273,24 +279,31 @@ bool Cut::try_split(std::int32_t index) {
     return true;
 }
 
-// A page that came late starts from its parent's finest shape: the youngest of the visible children sets the pace.
+// A page that came late starts from its parent's finest shape: the youngest of the visible children sets the pace. What
+// came while its parent was still growing waits for that, so that no level is taken in less than its time.
 void Cut::grow(std::int32_t index) {
     const CutNode& parent = nodes_[static_cast<std::size_t>(index)];
-    double youngest_s = -kInfinity;
+    const Level parents_finest = level_of(minimum_exponent(parent));
+    double from_s = parent.grows_from_s + settings_.growth_s;
     for (const std::int32_t child : parent.children) {
         if (child < 0) continue;
         const CutNode& node = nodes_[static_cast<std::size_t>(child)];
         if (node.visible() && node.slot >= 0)
-            youngest_s = std::max(youngest_s, residency_->heights.arrived_s[static_cast<std::size_t>(node.slot)]);
+            from_s = std::max(from_s, residency_->heights.arrived_s[static_cast<std::size_t>(node.slot)]);
     }
-    const double share = (residency_->now_s - youngest_s) / settings_.growth_s;
-    if (!(share < 1)) return;
-    const Level floor = level_of(minimum_exponent(parent)) - level_of_share(std::max(share, 0.0));
+    const double share = (residency_->now_s - from_s) / settings_.growth_s;
+    Level floor = std::numeric_limits<Level>::min();
+    if (share < 1) floor = parents_finest - level_of_share(std::max(share, 0.0));
+    if (parent.floor > parents_finest) floor = std::max(floor, parent.floor);
     for (const std::int32_t child : parent.children) {
         if (child < 0) continue;
         CutNode& node = nodes_[static_cast<std::size_t>(child)];
+        node.grows_from_s = from_s;
         node.floor = std::max(node.floor, floor);
-        if (node.visible() && node.level < floor) needs_floors_ = growing_ = true;
+        if (!node.visible() || node.level >= node.floor) continue;
+        // Neighbours keep to what is drawn, not to what it will be.
+        node.level = node.floor;
+        needs_floors_ = growing_ = true;
     }
 }
 
@@ -309,17 +322,23 @@ bool Cut::refine(std::span<const LodView> views, const CutSettings& settings, co
     views_ = views;
     settings_ = settings;
     residency_ = &residency;
-    nodes_.clear();
-    queue_.clear();
-    pages_ = steps_ = 0;
-    needs_floors_ = growing_ = false;
-    add_roots();
-    consider_from(0);
-    if (pages_ > settings_.max_pages) return false;
-    settle_levels();
-    if (pages_ > settings_.max_pages) return false;
-    if (needs_floors_) raise_to_floors();
-    return true;
+    steps_ = 0;
+    held_.clear();
+    for (;;) {
+        nodes_.clear();
+        queue_.clear();
+        pages_ = 0;
+        needs_floors_ = growing_ = false;
+        const std::size_t held = held_.size();
+        add_roots();
+        consider_from(0);
+        if (pages_ > settings_.max_pages) return false;
+        settle_levels();
+        if (pages_ > settings_.max_pages) return false;
+        if (needs_floors_) raise_to_floors();
+        if (held_.size() == held) return true;
+        // Pages that were split too far for neighbours which must stay coarse are left whole.
+    }
 }
 
 void Cut::enqueue(std::int32_t index) {
@@ -376,7 +395,7 @@ void Cut::constrain_neighbours(std::int32_t index) {
 // Brings a leaf down to a level, by splitting it where its own mesh cannot be that fine. True if something changed.
 bool Cut::lower(std::int32_t index, Level limit) {
     CutNode& node = nodes_[static_cast<std::size_t>(index)];
-    const Level finest = level_of(minimum_exponent(node));
+    const Level finest = node.floor;
     bool changed = false;
     if (node.level > std::max(limit, finest)) {
         node.level = std::max(limit, finest);
@@ -386,7 +405,8 @@ bool Cut::lower(std::int32_t index, Level limit) {
     }
     if (limit >= finest) return changed;
     const std::size_t first = nodes_.size();
-    if (node.id.level == lattice_.deepest_level || !try_split(index)) {
+    const bool growing = finest > level_of(minimum_exponent(node));
+    if (growing || node.id.level == lattice_.deepest_level || !try_split(index)) {
         needs_floors_ = true;
         return changed;
     }
@@ -400,7 +420,7 @@ void Cut::lower_relatives(std::int32_t index, Level limit) {
     for (std::int32_t above = nodes_[static_cast<std::size_t>(index)].parent; above >= 0;
          above = nodes_[static_cast<std::size_t>(above)].parent) {
         const CutNode& node = nodes_[static_cast<std::size_t>(above)];
-        const Level lowered = std::max(limit, level_of(minimum_exponent(node)));
+        const Level lowered = std::max(limit, node.floor);
         if (node.level <= lowered) return;
         lower_descendants(above, lowered);
     }
@@ -408,8 +428,8 @@ void Cut::lower_relatives(std::int32_t index, Level limit) {
 
 void Cut::lower_descendants(std::int32_t index, Level limit) {
     CutNode& node = nodes_[static_cast<std::size_t>(index)];
-    if (node.level <= limit) return;
-    node.level = limit;
+    if (node.level <= std::max(limit, node.floor)) return;
+    node.level = std::max(limit, node.floor);
     if (!node.split) {
         enqueue(index);
         return;
@@ -430,8 +450,11 @@ void Cut::raise_to_floors() {
         for (int d = 0; d < 4; ++d)
             for_each_neighbour(index, d, [&](std::int32_t other) {
                 CutNode& beside = nodes_[static_cast<std::size_t>(other)];
-                const Level least = std::min(beside.id.level < own_level ? floor : floor - kOneLevel,
-                                             level_of(maximum_exponent(beside)));
+                Level least = beside.id.level < own_level ? floor : floor - kOneLevel;
+                if (const Level coarsest = level_of(maximum_exponent(beside)); least > coarsest) {
+                    if (beside.parent >= 0) hold(nodes_[static_cast<std::size_t>(beside.parent)].id);
+                    least = coarsest;
+                }
                 if (beside.floor >= least) return;
                 beside.floor = least;
                 enqueue(other);
@@ -440,6 +463,10 @@ void Cut::raise_to_floors() {
     queue_.clear();
     for (CutNode& node : nodes_)
         if (!node.split) node.level = std::max(node.level, node.floor);
+}
+
+void Cut::hold(TileId id) {
+    if (std::find(held_.begin(), held_.end(), id) == held_.end()) held_.push_back(id);
 }
 
 Cut::Drawn Cut::drawn(std::int32_t index) {

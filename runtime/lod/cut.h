@@ -11,6 +11,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -52,8 +53,9 @@ struct CutNode {
     std::int32_t parent = -1;
     std::array<std::int32_t, 4> children{-1, -1, -1, -1};    ///< -1: does not exist, or the node is not split
     std::array<std::int32_t, 4> neighbours{-1, -1, -1, -1};  ///< by Direction: a node as large or larger, or -1
-    Level level = 0;            ///< drawn; of a split node: what it would be drawn at as a leaf
-    Level floor = 0;            ///< least level that it can be drawn at in this cut
+    Level level = 0;  ///< drawn; of a split node: what it would be drawn at as a leaf
+    Level floor = 0;  ///< least level that it can be drawn at in this cut
+    double grows_from_s = -std::numeric_limits<double>::infinity();  ///< when it begins to leave its parent's shape
     std::uint32_t seen_by = 0;  ///< views that may see its box; without any it is neither refined nor drawn
     std::uint32_t inside = 0;   ///< views that see all of its box
     bool split = false;
@@ -133,6 +135,7 @@ private:
     void lower_relatives(std::int32_t node, Level limit);
     void lower_descendants(std::int32_t node, Level limit);
     void raise_to_floors();
+    void hold(TileId id);
     void enqueue(std::int32_t leaf);
 
     const Dataset& dataset_;
@@ -146,6 +149,7 @@ private:
     std::int64_t pages_ = 0, steps_ = 0;
     bool needs_floors_ = false;
     bool growing_ = false;
+    std::vector<TileId> held_;  ///< not to be split in this cut
 };
 
 }  // namespace scree
