@@ -40,6 +40,9 @@ int sibling(int quadrant, int direction) {
     return kSibling[static_cast<std::size_t>(quadrant)][static_cast<std::size_t>(direction)];
 }
 
+/// The two quadrants that touch a side.
+constexpr std::array<std::array<int, 2>, 4> kTouching{{{0, 1}, {1, 3}, {2, 3}, {0, 2}}};
+
 Level level_of_share(double share) { return static_cast<Level>(share * kOneLevel); }
 
 }  // namespace
@@ -132,6 +135,7 @@ void Cut::judge_texture(CutNode& node) const {
     const double doublings = std::min(std::log2(node.texture_need), 64.0);
     double limit = 0;
     if (node.id.level < lattice_.deepest_level) {
+        node.doublings = doublings;
         limit = maximum_exponent(node) - 1 + kTextureApproach * std::max(0.0, -doublings);
     } else {
         // Textures deeper than the heights are drawn on parts of the page, each of one block of cells at least.
@@ -202,8 +206,6 @@ void Cut::for_each_leaf_on(std::int32_t index, int side, const Visit& visit) con
         if (node.visible()) visit(index);
         return;
     }
-    // The two children that touch `side` of the node.
-    static constexpr std::array<std::array<int, 2>, 4> kTouching{{{0, 1}, {1, 3}, {2, 3}, {0, 2}}};
     for (const int q : kTouching[static_cast<std::size_t>(side)])
         if (const std::int32_t child = node.children[static_cast<std::size_t>(q)]; child >= 0)
             for_each_leaf_on(child, side, visit);
@@ -343,7 +345,7 @@ bool Cut::refine(std::span<const LodView> views, const CutSettings& settings, co
 
 void Cut::enqueue(std::int32_t index) {
     CutNode& node = nodes_[static_cast<std::size_t>(index)];
-    if (node.queued || node.split || !node.visible()) return;
+    if (node.queued || !node.visible()) return;
     node.queued = true;
     queue_.push_back(index);
 }
@@ -352,15 +354,31 @@ void Cut::settle_levels() {
     for (std::size_t k = 0; k < nodes_.size(); ++k) enqueue(static_cast<std::int32_t>(k));
     for (std::size_t head = 0; head < queue_.size() && pages_ <= settings_.max_pages; ++head) {
         nodes_[static_cast<std::size_t>(queue_[head])].queued = false;
-        if (!nodes_[static_cast<std::size_t>(queue_[head])].split) constrain_neighbours(queue_[head]);
+        constrain_neighbours(queue_[head]);
     }
     queue_.clear();
 }
 
-// Applies the rules between a leaf and those beside it, both ways.
+// How far above its neighbour of the same size a page may be: a level, but where one of them is split for its texture
+// and the other is not, or is about to be, its children would not be allowed above the neighbour at all.
+Level Cut::allowance(const CutNode& node, const CutNode& beside) const {
+    if (!(node.doublings > -1 / kTextureApproach)) return kOneLevel;
+    return level_of_share(std::clamp(kTextureApproach * std::max(-node.doublings, beside.doublings), 0.0, 1.0));
+}
+
+// How coarse a smaller page may be: no coarser than a leaf; less and less bound to what was one as its need has grown.
+Level Cut::limit_beside(const CutNode& node) const {
+    if (!node.split) return node.level;
+    return node.level + level_of_share(std::clamp(kTextureApproach * node.doublings, 0.0, 1.0));
+}
+
+// Applies the rules between a page and those beside it, both ways. A split page stands for what it would be drawn at as
+// a leaf: what has been asked of its neighbours for its sake is still asked once it is split, or they would jump.
 void Cut::constrain_neighbours(std::int32_t index) {
+    lower_relatives(index, nodes_[static_cast<std::size_t>(index)].level);
     const CutNode& start = nodes_[static_cast<std::size_t>(index)];
     const Level level = start.level;
+    const bool leaf = !start.split;
     Level limit = level + kOneLevel;
     // The finest surface is only inexact where its edges move: they may move no further than its tolerance allows.
     if (start.id.level == lattice_.deepest_level && settings_.tau_px * start.metres_per_px < start.finest_error_m)
@@ -370,24 +388,37 @@ void Cut::constrain_neighbours(std::int32_t index) {
         for (;;) {
             const std::int32_t other = neighbour(index, d);
             if (other < 0) break;
-            const CutNode& beside = nodes_[static_cast<std::size_t>(other)];
-            if (beside.split) {
-                for_each_leaf_on(other, opposite(d), [&](std::int32_t smaller) {
-                    const Level theirs = nodes_[static_cast<std::size_t>(smaller)].level;
-                    own_limit = std::min(own_limit, theirs + kOneLevel);
-                    if (theirs > level) lower(smaller, level);
-                });
+            // Anything may move in memory below.
+            const CutNode own = nodes_[static_cast<std::size_t>(index)];
+            const CutNode beside = nodes_[static_cast<std::size_t>(other)];
+            if (!beside.visible()) break;
+            const bool larger = beside.id.level < own.id.level;
+            if (larger) {
+                own_limit = std::min(own_limit, beside.level);
+                if (leaf && beside.level > limit && lower(other, limit)) continue;
                 break;
             }
-            if (!beside.visible()) break;
-            if (beside.level > limit && lower(other, limit)) continue;
-            // Anything may have moved in memory.
-            const CutNode& settled = nodes_[static_cast<std::size_t>(other)];
-            const bool larger = settled.id.level < nodes_[static_cast<std::size_t>(index)].id.level;
-            own_limit = std::min(own_limit, larger ? settled.level : settled.level + kOneLevel);
+            own_limit = std::min(own_limit, beside.level + allowance(own, beside));
+            if (beside.parent >= 0 && beside.parent != own.parent)
+                own_limit = std::min(own_limit, limit_beside(nodes_[static_cast<std::size_t>(beside.parent)]));
+            const Level theirs = level + allowance(beside, own);
+            if (beside.level > theirs) lower(other, theirs);
+            if (beside.split) {
+                for (const int q : kTouching[static_cast<std::size_t>(opposite(d))])
+                    if (const std::int32_t child = beside.children[static_cast<std::size_t>(q)];
+                        child >= 0 && nodes_[static_cast<std::size_t>(child)].visible() &&
+                        nodes_[static_cast<std::size_t>(child)].level > limit_beside(own))
+                        lower(child, limit_beside(own));
+                if (leaf)
+                    for_each_leaf_on(other, opposite(d), [&](std::int32_t smaller) {
+                        own_limit = std::min(own_limit, nodes_[static_cast<std::size_t>(smaller)].level + kOneLevel);
+                    });
+                break;
+            }
+            if (leaf && beside.level > limit && lower(other, limit)) continue;
             break;
         }
-        if (nodes_[static_cast<std::size_t>(index)].split) return;
+        if (leaf && nodes_[static_cast<std::size_t>(index)].split) return;
     }
     if (own_limit < nodes_[static_cast<std::size_t>(index)].level) lower(index, own_limit);
 }
@@ -398,12 +429,12 @@ bool Cut::lower(std::int32_t index, Level limit) {
     const Level finest = node.floor;
     bool changed = false;
     if (node.level > std::max(limit, finest)) {
-        node.level = std::max(limit, finest);
-        enqueue(index);
-        lower_relatives(index, node.level);
+        const Level lowered = std::max(limit, finest);
+        lower_descendants(index, lowered);
+        lower_relatives(index, lowered);
         changed = true;
     }
-    if (limit >= finest) return changed;
+    if (limit >= finest || nodes_[static_cast<std::size_t>(index)].split) return changed;
     const std::size_t first = nodes_.size();
     const bool growing = finest > level_of(minimum_exponent(node));
     if (growing || node.id.level == lattice_.deepest_level || !try_split(index)) {
@@ -430,17 +461,15 @@ void Cut::lower_descendants(std::int32_t index, Level limit) {
     CutNode& node = nodes_[static_cast<std::size_t>(index)];
     if (node.level <= std::max(limit, node.floor)) return;
     node.level = std::max(limit, node.floor);
-    if (!node.split) {
-        enqueue(index);
-        return;
-    }
+    enqueue(index);
     for (const std::int32_t child : node.children)
         if (child >= 0) lower_descendants(child, limit);
 }
 
 // Where a page cannot be as fine as its neighbours want, or is still growing, the finer side stays coarse.
 void Cut::raise_to_floors() {
-    for (std::size_t k = 0; k < nodes_.size(); ++k) enqueue(static_cast<std::int32_t>(k));
+    for (std::size_t k = 0; k < nodes_.size(); ++k)
+        if (!nodes_[k].split) enqueue(static_cast<std::int32_t>(k));
     for (std::size_t head = 0; head < queue_.size(); ++head) {
         const std::int32_t index = queue_[head];
         CutNode& node = nodes_[static_cast<std::size_t>(index)];

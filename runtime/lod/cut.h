@@ -65,7 +65,8 @@ struct CutNode {
     double texel_per_px = 0;    ///< least over the views of d / f: metres of texture a pixel covers
     double finest_error_m = 0;  ///< of its own densest mesh, thinned edges included
     double texture_need = 0;    ///< of its own texture over the tolerance, where finer textures exist
-    double priority = 0;        ///< need of the parent when it was split
+    double doublings = -std::numeric_limits<double>::infinity();  ///< log2 of texture_need where it may split the page
+    double priority = 0;                                          ///< need of the parent when it was split
 
     bool visible() const { return seen_by != 0; }
 };
@@ -130,13 +131,15 @@ private:
     bool try_split(std::int32_t node);
     void grow(std::int32_t parent);
     void settle_levels();
-    void constrain_neighbours(std::int32_t leaf);
-    bool lower(std::int32_t leaf, Level limit);
+    Level allowance(const CutNode& node, const CutNode& beside) const;
+    Level limit_beside(const CutNode& node) const;
+    void constrain_neighbours(std::int32_t node);
+    bool lower(std::int32_t node, Level limit);
     void lower_relatives(std::int32_t node, Level limit);
     void lower_descendants(std::int32_t node, Level limit);
     void raise_to_floors();
     void hold(TileId id);
-    void enqueue(std::int32_t leaf);
+    void enqueue(std::int32_t node);
 
     const Dataset& dataset_;
     const Lattice lattice_;
