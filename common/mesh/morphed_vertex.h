@@ -8,6 +8,7 @@
 #include <cstdint>
 
 #include "common/mesh/tile_patterns.h"
+#include "common/mesh/vertex_slot.h"
 
 namespace scree {
 
@@ -24,6 +25,8 @@ struct VertexMorph {
     /// Squared distance, in the tile's own samples, to the two vertices between which it moves: curvature adds weight *
     /// that / (2 R) to the drop, the mean of theirs.
     float reach_squared = 0;
+    /// Share of SlotVertex::rim_n: its own weight times that of the border vertex it moves half-way to.
+    float rim_weight = 0;
 };
 
 /// Weight of a drawn vertex (i, j), 0 <= i, j <= m.
@@ -41,12 +44,25 @@ inline VertexMorph vertex_morph(int i, int j, int tile_cells_log2, const Morphed
     // Born at this stride: not on the grid of twice the stride.
     if (((i | j) & (2 * stride - 1)) != stride) return {};
     const bool diagonal = (i & (2 * stride - 1)) != 0 && (j & (2 * stride - 1)) != 0;
-    return {weight, static_cast<float>(diagonal ? 2 * stride * stride : stride * stride)};
+    const float reach_squared = static_cast<float>(diagonal ? 2 * stride * stride : stride * stride);
+    if (diagonal || north || east || south || west) return {weight, reach_squared, 0};
+    // One stride from a thinned border, half-way to a vertex that moves along it: goes with it, or the surface would
+    // jump where the tile reaches its next level.
+    const int near = j == stride ? 0 : i == m - stride ? 1 : j == m - stride ? 2 : i == stride ? 3 : -1;
+    const int along = near % 2 == 0 ? i : j;
+    if (near < 0 || (p.edge_mask >> near & 1u) == 0 || (along & (4 * stride - 1)) != 2 * stride)
+        return {weight, reach_squared, 0};
+    const float rim = p.edge_morph[static_cast<std::size_t>(near)];
+    return {weight, reach_squared * (1 + 2 * rim), weight * rim};
 }
 
 /// Height in quanta, as the vertex shader computes it (no fused multiply-add anywhere).
 inline float morphed_height(float height_n, float next_n, float weight) {
     return height_n * (1.0f - weight) + next_n * weight;
+}
+
+inline float morphed_height(const SlotVertex& vertex, const VertexMorph& morph) {
+    return morphed_height(vertex.height_n, vertex.next_n, morph.weight) + vertex.rim_n * morph.rim_weight;
 }
 
 }  // namespace scree

@@ -29,7 +29,7 @@ void fill_vertex_slot(std::span<const std::int32_t> samples, int tile_cells_log2
     assert(samples.size() == slot_vertex_count(tile_cells_log2) && out.size() == samples.size());
     for (std::size_t k = 0; k < out.size(); ++k) {
         const float own = static_cast<float>(samples[k]);
-        out[k] = {own, own};
+        out[k] = {own, own, 0};
     }
     // The vertices born at a stride are those of its grid that twice the stride leaves out; every level writes its own.
     for (int stride = 1; stride < cells; stride *= 2) {
@@ -45,6 +45,17 @@ void fill_vertex_slot(std::span<const std::int32_t> samples, int tile_cells_log2
     // The whole tile is no cell of a coarser level of its own: its centre stays.
     SlotVertex& centre = out[static_cast<std::size_t>(cells / 2 * pitch + cells / 2)];
     centre.next_n = centre.height_n;
+    for (std::ptrdiff_t stride = 1; 4 * stride <= cells; stride *= 2)
+        for (std::ptrdiff_t along = 2 * stride; along < cells; along += 4 * stride) {
+            const auto rim = [&](std::ptrdiff_t border, std::ptrdiff_t inner) {
+                const SlotVertex& moves = out[static_cast<std::size_t>(border)];
+                out[static_cast<std::size_t>(inner)].rim_n = 0.5f * (moves.next_n - moves.height_n);
+            };
+            rim(along, stride * pitch + along);
+            rim(along * pitch + cells, along * pitch + cells - stride);
+            rim(cells * pitch + along, (cells - stride) * pitch + along);
+            rim(along * pitch, along * pitch + stride);
+        }
 }
 
 }  // namespace scree

@@ -15,10 +15,14 @@ struct SlotVertex {
     /// k + 1 cell whose middle it is. The mid-point of a whole edge of the tile (k = n - 1) has the mean of the edge's
     /// ends; the tile's corners and its centre, which never move, their own height. Exact (multiples of one half).
     float next_n = 0;
+    /// Half of what a border vertex moves when it goes to its next_n: of the vertices that lie one stride s from a
+    /// border, where they are born, half-way to a border vertex born at 2 s. On a thinned border that one moves while
+    /// they do. Elsewhere 0.
+    float rim_n = 0;
 };
-static_assert(sizeof(SlotVertex) == 8);
+static_assert(sizeof(SlotVertex) == 12);
 
-/// (m+1)^2 grid vertices; 33^2 = 1089 vertices = 8,712 bytes.
+/// (m+1)^2 grid vertices; 33^2 = 1089 vertices = 13,068 bytes.
 inline std::size_t slot_vertex_count(int tile_cells_log2) {
     const std::size_t m = std::size_t{1} << tile_cells_log2;
     return (m + 1) * (m + 1);

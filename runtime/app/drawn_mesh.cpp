@@ -67,7 +67,7 @@ DrawnMesh drawn_mesh(const Dataset& d, const TilePatterns& patterns, const DrawL
                                                    d.lattice.tile_cells_log2, pattern);
             mesh.corners.push_back({static_cast<std::int32_t>(corner.i + index % pitch * step),
                                     static_cast<std::int32_t>(corner.j + index / pitch * step),
-                                    morphed_height(vertices[index].height_n, vertices[index].next_n, morph.weight),
+                                    morphed_height(vertices[index], morph),
                                     morph.weight * (morph.reach_squared * (side_m * side_m))});
         }
     }

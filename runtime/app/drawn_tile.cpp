@@ -24,7 +24,7 @@ void DrawnTile::set(const DrawItem& item, std::span<const SlotVertex> vertices) 
             const VertexMorph morph = vertex_morph(i, j, n, pattern);
             positions_[k] = frame_.position(static_cast<std::int32_t>(corner.i) + i * step,
                                             static_cast<std::int32_t>(corner.j) + j * step,
-                                            morphed_height(vertices[k].height_n, vertices[k].next_n, morph.weight),
+                                            morphed_height(vertices[k], morph),
                                             morph.weight * (morph.reach_squared * (side * side)));
         }
 }

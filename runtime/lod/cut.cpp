@@ -40,6 +40,9 @@ int sibling(int quadrant, int direction) {
     return kSibling[static_cast<std::size_t>(quadrant)][static_cast<std::size_t>(direction)];
 }
 
+/// The two quadrants that touch a side.
+constexpr std::array<std::array<int, 2>, 4> kTouching{{{0, 1}, {1, 3}, {2, 3}, {0, 2}}};
+
 Level level_of_share(double share) { return static_cast<Level>(share * kOneLevel); }
 
 }  // namespace
@@ -122,10 +125,11 @@ void Cut::judge_texture(CutNode& node) const {
     node.texture_need =
         texel_m_[static_cast<std::size_t>(node.id.level)] / node.texel_per_px / settings_.texture_tau_px;
     const bool parts = node.id.level == lattice_.deepest_level;
-    if (parts ? node.texture_need <= 1 : node.level <= level_of(maximum_exponent(node) - 1)) return;
+    if (parts && node.texture_need <= 1) return;
     const double doublings = std::min(std::log2(node.texture_need), 64.0);
     double limit = 0;
     if (!parts) {
+        node.doublings = doublings;
         limit = maximum_exponent(node) - 1 + kTextureApproach * std::max(0.0, -doublings);
     } else {
         // Textures deeper than the heights are drawn on parts of the page, each of one block of cells at least.
@@ -207,8 +211,6 @@ void Cut::for_each_leaf_on(std::int32_t index, int side, const Visit& visit) con
         if (node.visible()) visit(index);
         return;
     }
-    // The two children that touch `side` of the node.
-    static constexpr std::array<std::array<int, 2>, 4> kTouching{{{0, 1}, {1, 3}, {2, 3}, {0, 2}}};
     for (const int q : kTouching[static_cast<std::size_t>(side)])
         if (const std::int32_t child = node.children[static_cast<std::size_t>(q)]; child >= 0)
             for_each_leaf_on(child, side, visit);
@@ -224,6 +226,12 @@ bool Cut::try_split(std::int32_t index) {
     {
         const CutNode& node = nodes_[static_cast<std::size_t>(index)];
         if (node.slot < 0) return false;
+        if (std::find(held_.begin(), held_.end(), node.id) != held_.end()) return false;
+        // Still so coarse that its children could not be drawn like it.
+        if (node.floor > level_of(maximum_exponent(node) - 1)) {
+            needs_floors_ = growing_ = true;
+            return false;
+        }
         // Next to a page that can only be drawn too coarsely for the children there is nothing to be gained.
         const int coarsest_beside = node.id.level + 1 - lattice_.tile_cells_log2;
         for (int d = 0; d < 4 && coarsest_beside > 0; ++d)
@@ -279,24 +287,31 @@ bool Cut::try_split(std::int32_t index) {
     return true;
 }
 
-// A page that came late starts from its parent's finest shape: the youngest of the visible children sets the pace.
+// A page that came late starts from its parent's finest shape: the youngest of the visible children sets the pace. What
+// came while its parent was still growing waits for that, so that no level is taken in less than its time.
 void Cut::grow(std::int32_t index) {
     const CutNode& parent = nodes_[static_cast<std::size_t>(index)];
-    double youngest_s = -kInfinity;
+    const Level parents_finest = level_of(minimum_exponent(parent));
+    double from_s = parent.grows_from_s + settings_.growth_s;
     for (const std::int32_t child : parent.children) {
         if (child < 0) continue;
         const CutNode& node = nodes_[static_cast<std::size_t>(child)];
         if (node.visible() && node.slot >= 0)
-            youngest_s = std::max(youngest_s, residency_->heights.arrived_s[static_cast<std::size_t>(node.slot)]);
+            from_s = std::max(from_s, residency_->heights.arrived_s[static_cast<std::size_t>(node.slot)]);
     }
-    const double share = (residency_->now_s - youngest_s) / settings_.growth_s;
-    if (!(share < 1)) return;
-    const Level floor = level_of(minimum_exponent(parent)) - level_of_share(std::max(share, 0.0));
+    const double share = (residency_->now_s - from_s) / settings_.growth_s;
+    Level floor = std::numeric_limits<Level>::min();
+    if (share < 1) floor = parents_finest - level_of_share(std::max(share, 0.0));
+    if (parent.floor > parents_finest) floor = std::max(floor, parent.floor);
     for (const std::int32_t child : parent.children) {
         if (child < 0) continue;
         CutNode& node = nodes_[static_cast<std::size_t>(child)];
+        node.grows_from_s = from_s;
         node.floor = std::max(node.floor, floor);
-        if (node.visible() && node.level < floor) needs_floors_ = growing_ = true;
+        if (!node.visible() || node.level >= node.floor) continue;
+        // Neighbours keep to what is drawn, not to what it will be.
+        node.level = node.floor;
+        needs_floors_ = growing_ = true;
     }
 }
 
@@ -322,22 +337,28 @@ bool Cut::refine(std::span<const LodView> views, const CutSettings& settings, co
         const double stride_m = std::ldexp(lattice_.spacing_m, static_cast<int>(exponent));
         curving_m_[exponent] = stride_m * stride_m * settings.half_curvature;
     }
-    nodes_.clear();
-    queue_.clear();
-    pages_ = steps_ = 0;
-    needs_floors_ = growing_ = false;
-    add_roots();
-    consider_from(0);
-    if (pages_ > settings_.max_pages) return false;
-    settle_levels();
-    if (pages_ > settings_.max_pages) return false;
-    if (needs_floors_) raise_to_floors();
-    return true;
+    steps_ = 0;
+    held_.clear();
+    for (;;) {
+        nodes_.clear();
+        queue_.clear();
+        pages_ = 0;
+        needs_floors_ = growing_ = false;
+        const std::size_t held = held_.size();
+        add_roots();
+        consider_from(0);
+        if (pages_ > settings_.max_pages) return false;
+        settle_levels();
+        if (pages_ > settings_.max_pages) return false;
+        if (needs_floors_) raise_to_floors();
+        if (held_.size() == held) return true;
+        // Pages that were split too far for neighbours which must stay coarse are left whole.
+    }
 }
 
 void Cut::enqueue(std::int32_t index) {
     CutNode& node = nodes_[static_cast<std::size_t>(index)];
-    if (node.queued || node.split || !node.visible()) return;
+    if (node.queued || !node.visible()) return;
     node.queued = true;
     queue_.push_back(index);
 }
@@ -346,15 +367,31 @@ void Cut::settle_levels() {
     for (std::size_t k = 0; k < nodes_.size(); ++k) enqueue(static_cast<std::int32_t>(k));
     for (std::size_t head = 0; head < queue_.size() && pages_ <= settings_.max_pages; ++head) {
         nodes_[static_cast<std::size_t>(queue_[head])].queued = false;
-        if (!nodes_[static_cast<std::size_t>(queue_[head])].split) constrain_neighbours(queue_[head]);
+        constrain_neighbours(queue_[head]);
     }
     queue_.clear();
 }
 
-// Applies the rules between a leaf and those beside it, both ways.
+// How far above its neighbour of the same size a page may be: a level, but where one of them is split for its texture
+// and the other is not, or is about to be, its children would not be allowed above the neighbour at all.
+Level Cut::allowance(const CutNode& node, const CutNode& beside) const {
+    if (!(node.doublings > -1 / kTextureApproach)) return kOneLevel;
+    return level_of_share(std::clamp(kTextureApproach * std::max(-node.doublings, beside.doublings), 0.0, 1.0));
+}
+
+// How coarse a smaller page may be: no coarser than a leaf; less and less bound to what was one as its need has grown.
+Level Cut::limit_beside(const CutNode& node) const {
+    if (!node.split) return node.level;
+    return node.level + level_of_share(std::clamp(kTextureApproach * node.doublings, 0.0, 1.0));
+}
+
+// Applies the rules between a page and those beside it, both ways. A split page stands for what it would be drawn at as
+// a leaf: what has been asked of its neighbours for its sake is still asked once it is split, or they would jump.
 void Cut::constrain_neighbours(std::int32_t index) {
+    lower_relatives(index, nodes_[static_cast<std::size_t>(index)].level);
     const CutNode& start = nodes_[static_cast<std::size_t>(index)];
     const Level level = start.level;
+    const bool leaf = !start.split;
     Level limit = level + kOneLevel;
     // The finest surface is only inexact where its edges move: they may move no further than its tolerance allows.
     if (start.id.level == lattice_.deepest_level && settings_.tau_px * start.metres_per_px < start.finest_error_m)
@@ -364,24 +401,37 @@ void Cut::constrain_neighbours(std::int32_t index) {
         for (;;) {
             const std::int32_t other = neighbour(index, d);
             if (other < 0) break;
-            const CutNode& beside = nodes_[static_cast<std::size_t>(other)];
-            if (beside.split) {
-                for_each_leaf_on(other, opposite(d), [&](std::int32_t smaller) {
-                    const Level theirs = nodes_[static_cast<std::size_t>(smaller)].level;
-                    own_limit = std::min(own_limit, theirs + kOneLevel);
-                    if (theirs > level) lower(smaller, level);
-                });
+            // Anything may move in memory below.
+            const CutNode own = nodes_[static_cast<std::size_t>(index)];
+            const CutNode beside = nodes_[static_cast<std::size_t>(other)];
+            if (!beside.visible()) break;
+            const bool larger = beside.id.level < own.id.level;
+            if (larger) {
+                own_limit = std::min(own_limit, beside.level);
+                if (leaf && beside.level > limit && lower(other, limit)) continue;
                 break;
             }
-            if (!beside.visible()) break;
-            if (beside.level > limit && lower(other, limit)) continue;
-            // Anything may have moved in memory.
-            const CutNode& settled = nodes_[static_cast<std::size_t>(other)];
-            const bool larger = settled.page_level < nodes_[static_cast<std::size_t>(index)].page_level;
-            own_limit = std::min(own_limit, larger ? settled.level : settled.level + kOneLevel);
+            own_limit = std::min(own_limit, beside.level + allowance(own, beside));
+            if (beside.parent >= 0 && beside.parent != own.parent)
+                own_limit = std::min(own_limit, limit_beside(nodes_[static_cast<std::size_t>(beside.parent)]));
+            const Level theirs = level + allowance(beside, own);
+            if (beside.level > theirs) lower(other, theirs);
+            if (beside.split) {
+                for (const int q : kTouching[static_cast<std::size_t>(opposite(d))])
+                    if (const std::int32_t child = beside.children[static_cast<std::size_t>(q)];
+                        child >= 0 && nodes_[static_cast<std::size_t>(child)].visible() &&
+                        nodes_[static_cast<std::size_t>(child)].level > limit_beside(own))
+                        lower(child, limit_beside(own));
+                if (leaf)
+                    for_each_leaf_on(other, opposite(d), [&](std::int32_t smaller) {
+                        own_limit = std::min(own_limit, nodes_[static_cast<std::size_t>(smaller)].level + kOneLevel);
+                    });
+                break;
+            }
+            if (leaf && beside.level > limit && lower(other, limit)) continue;
             break;
         }
-        if (nodes_[static_cast<std::size_t>(index)].split) return;
+        if (leaf && nodes_[static_cast<std::size_t>(index)].split) return;
     }
     if (own_limit < nodes_[static_cast<std::size_t>(index)].level) lower(index, own_limit);
 }
@@ -389,17 +439,18 @@ void Cut::constrain_neighbours(std::int32_t index) {
 // Brings a leaf down to a level, by splitting it where its own mesh cannot be that fine. True if something changed.
 bool Cut::lower(std::int32_t index, Level limit) {
     CutNode& node = nodes_[static_cast<std::size_t>(index)];
-    const Level finest = level_of(minimum_exponent(node));
+    const Level finest = node.floor;
     bool changed = false;
     if (node.level > std::max(limit, finest)) {
-        node.level = std::max(limit, finest);
-        enqueue(index);
-        lower_relatives(index, node.level);
+        const Level lowered = std::max(limit, finest);
+        lower_descendants(index, lowered);
+        lower_relatives(index, lowered);
         changed = true;
     }
-    if (limit >= finest) return changed;
+    if (limit >= finest || nodes_[static_cast<std::size_t>(index)].split) return changed;
     const std::size_t first = nodes_.size();
-    if (node.id.level == lattice_.deepest_level || !try_split(index)) {
+    const bool growing = finest > level_of(minimum_exponent(node));
+    if (growing || node.id.level == lattice_.deepest_level || !try_split(index)) {
         needs_floors_ = true;
         return changed;
     }
@@ -413,7 +464,7 @@ void Cut::lower_relatives(std::int32_t index, Level limit) {
     for (std::int32_t above = nodes_[static_cast<std::size_t>(index)].parent; above >= 0;
          above = nodes_[static_cast<std::size_t>(above)].parent) {
         const CutNode& node = nodes_[static_cast<std::size_t>(above)];
-        const Level lowered = std::max(limit, level_of(minimum_exponent(node)));
+        const Level lowered = std::max(limit, node.floor);
         if (node.level <= lowered) return;
         lower_descendants(above, lowered);
     }
@@ -421,19 +472,17 @@ void Cut::lower_relatives(std::int32_t index, Level limit) {
 
 void Cut::lower_descendants(std::int32_t index, Level limit) {
     CutNode& node = nodes_[static_cast<std::size_t>(index)];
-    if (node.level <= limit) return;
-    node.level = limit;
-    if (!node.split) {
-        enqueue(index);
-        return;
-    }
+    if (node.level <= std::max(limit, node.floor)) return;
+    node.level = std::max(limit, node.floor);
+    enqueue(index);
     for (const std::int32_t child : node.children)
         if (child >= 0) lower_descendants(child, limit);
 }
 
 // Where a page cannot be as fine as its neighbours want, or is still growing, the finer side stays coarse.
 void Cut::raise_to_floors() {
-    for (std::size_t k = 0; k < nodes_.size(); ++k) enqueue(static_cast<std::int32_t>(k));
+    for (std::size_t k = 0; k < nodes_.size(); ++k)
+        if (!nodes_[k].split) enqueue(static_cast<std::int32_t>(k));
     for (std::size_t head = 0; head < queue_.size(); ++head) {
         const std::int32_t index = queue_[head];
         CutNode& node = nodes_[static_cast<std::size_t>(index)];
@@ -443,8 +492,11 @@ void Cut::raise_to_floors() {
         for (int d = 0; d < 4; ++d)
             for_each_neighbour(index, d, [&](std::int32_t other) {
                 CutNode& beside = nodes_[static_cast<std::size_t>(other)];
-                const Level least = std::min(beside.id.level < own_level ? floor : floor - kOneLevel,
-                                             level_of(maximum_exponent(beside)));
+                Level least = beside.id.level < own_level ? floor : floor - kOneLevel;
+                if (const Level coarsest = level_of(maximum_exponent(beside)); least > coarsest) {
+                    if (beside.parent >= 0) hold(nodes_[static_cast<std::size_t>(beside.parent)].id);
+                    least = coarsest;
+                }
                 if (beside.floor >= least) return;
                 beside.floor = least;
                 enqueue(other);
@@ -453,6 +505,10 @@ void Cut::raise_to_floors() {
     queue_.clear();
     for (CutNode& node : nodes_)
         if (!node.split) node.level = std::max(node.level, node.floor);
+}
+
+void Cut::hold(TileId id) {
+    if (std::find(held_.begin(), held_.end(), id) == held_.end()) held_.push_back(id);
 }
 
 Cut::Drawn Cut::drawn(std::int32_t index) {

@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -67,8 +68,10 @@ struct alignas(64) CutNode {
     double west_m = 0, north_m = 0;  ///< its north-west corner
     double finest_error_m = 0;       ///< of its own densest mesh, thinned edges included
     double texture_need = 0;         ///< of its own texture over the tolerance, where finer textures exist
-    double priority = 0;             ///< need of the parent when it was split
-    std::uint32_t inside = 0;        ///< views that see all of its box
+    double doublings = -std::numeric_limits<double>::infinity();  ///< log2 of texture_need where it may split the page
+    double grows_from_s = -std::numeric_limits<double>::infinity();  ///< when it begins to leave its parent's shape
+    double priority = 0;                                             ///< need of the parent when it was split
+    std::uint32_t inside = 0;                                        ///< views that see all of its box
 
     bool visible() const { return seen_by != 0; }
 };
@@ -142,12 +145,15 @@ private:
     bool try_split(std::int32_t node);
     void grow(std::int32_t parent);
     void settle_levels();
-    void constrain_neighbours(std::int32_t leaf);
-    bool lower(std::int32_t leaf, Level limit);
+    Level allowance(const CutNode& node, const CutNode& beside) const;
+    Level limit_beside(const CutNode& node) const;
+    void constrain_neighbours(std::int32_t node);
+    bool lower(std::int32_t node, Level limit);
     void lower_relatives(std::int32_t node, Level limit);
     void lower_descendants(std::int32_t node, Level limit);
     void raise_to_floors();
-    void enqueue(std::int32_t leaf);
+    void hold(TileId id);
+    void enqueue(std::int32_t node);
 
     const Dataset& dataset_;
     const Lattice lattice_;
@@ -164,6 +170,7 @@ private:
     std::int64_t pages_ = 0, steps_ = 0;
     bool needs_floors_ = false;
     bool growing_ = false;
+    std::vector<TileId> held_;  ///< not to be split in this cut
 };
 
 }  // namespace scree

@@ -64,8 +64,8 @@ struct Selector::Impl {
     explicit Impl(const Dataset& d) : dataset(d), plan(d), standing(d), textures(d) {}
 
     const Dataset& dataset;
-    Cut plan;      // what full residency would draw
-    Cut standing;  // what residency allows
+    Cut plan;      // what full residency would draw once grown
+    Cut standing;  // what residency and growth allow
     TexturePlan textures;
     Selection result;
     std::vector<LodView> views;
@@ -77,7 +77,7 @@ struct Selector::Impl {
                 s.height_slots,
                 false,
                 s.half_curvature,
-                s.growth_s};
+                0};
     }
 
     // One plan at given coarsenings; whether it fits the slots.
@@ -100,11 +100,13 @@ struct Selector::Impl {
         try_plan(s, residency, geometry_steps, texture_steps);
     }
 
-    void request_missing(const Residency& residency) {
+    void request_missing(const SelectionSettings& settings, const Residency& residency) {
+        double youngest_s = -std::numeric_limits<double>::infinity();
         for (const CutNode& node : plan.nodes()) {
             if (!node.visible()) continue;
             if (node.slot >= 0) {
                 result.planned_heights.push_back(node.slot);
+                youngest_s = std::max(youngest_s, residency.heights.arrived_s[static_cast<std::size_t>(node.slot)]);
             } else if (node.slot == kNotResident) {
                 result.complete = false;
                 result.requests.push_back({TileKind::height, node.id, node.priority});
@@ -120,7 +122,9 @@ struct Selector::Impl {
             if (a.kind != b.kind) return a.kind < b.kind;
             return a.id < b.id;
         });
-        use_standing_ = !heights_complete;
+        // A chain of late pages grows level by level.
+        const double grown_s = youngest_s + settings.growth_s * (dataset.lattice.deepest_level + 1);
+        use_standing_ = !heights_complete || residency.now_s < grown_s;
     }
 
     void emit(Cut& cut, const SelectionSettings& settings) {
@@ -186,7 +190,7 @@ struct Selector::Impl {
 
     void select(const SelectionSettings& settings, const Residency& residency) {
         make_plan(settings, residency);
-        request_missing(residency);
+        request_missing(settings, residency);
         if (!use_standing_) {
             // What is planned is what is drawn; textures that are still to come are stood in for.
             emit(plan, settings);
@@ -198,6 +202,7 @@ struct Selector::Impl {
         cut.texture_tau_px = result.texture_tau_effective_px;
         cut.max_pages = kNoLimit;
         cut.only_resident = true;
+        cut.growth_s = settings.growth_s;
         standing.refine(views, cut, residency);
         result.refine_steps += standing.steps();
         for (const CutNode& node : standing.nodes())

@@ -57,6 +57,7 @@ std::int64_t TexturePlan::wish(const Cut& cut, std::span<const LodView> views, c
     fading_ = false;
     const auto& nodes = cut.nodes();
     needs_.assign(nodes.size(), 0);
+    wanted_.assign(residency.textures.headers.size(), false);
     std::int64_t count = dataset_.lattice.root_rows * dataset_.lattice.root_columns;
     for (std::size_t k = 0; k < nodes.size(); ++k) {
         const CutNode& leaf = nodes[k];
@@ -71,7 +72,10 @@ std::int64_t TexturePlan::wish(const Cut& cut, std::span<const LodView> views, c
                                     : texel_m(node.id.level - 1) / leaf.texel_per_px / settings_.texture_tau_px;
             double& known = needs_[static_cast<std::size_t>(index)];
             if (known >= need) break;  // the ancestors have been reached from as near before
-            if (known == 0 && node.id.level > 0) ++count;
+            if (known == 0) {
+                if (node.id.level > 0) ++count;
+                mark_wanted(node.texture_slot);
+            }
             known = need;
         }
         if (up == 0 && deeper_than_heights() && leaf.id.level == dataset_.lattice.deepest_level)
@@ -128,7 +132,8 @@ void TexturePlan::place(const Cut& cut, std::int32_t leaf, double fade_s, DrawIt
     fading_ = true;
 }
 
-std::int32_t TexturePlan::slot_at(TileId id) const {
+// Only what is wanted counts: a settled picture does not depend on what else happens to be in memory.
+std::int32_t TexturePlan::wanted_slot_at(TileId id) const {
     const Lattice& l = dataset_.lattice;
     if (!l.contains(id)) return kNotResident;
     const TileId root = ancestor_at(id, 0);
@@ -136,7 +141,11 @@ std::int32_t TexturePlan::slot_at(TileId id) const {
     for (int level = 1; level <= id.level && slot >= 0; ++level)
         slot = residency_->textures.children[static_cast<std::size_t>(slot)]
                                             [static_cast<std::size_t>(quadrant_of(ancestor_at(id, level)))];
-    return std::max(slot, kNotResident);
+    return slot >= 0 && wanted_[static_cast<std::size_t>(slot)] ? slot : kNotResident;
+}
+
+void TexturePlan::mark_wanted(std::int32_t slot) {
+    if (slot >= 0) wanted_[static_cast<std::size_t>(slot)] = true;
 }
 
 // Across which borders of its texture a page that shows it large must be filtered.
@@ -146,7 +155,7 @@ void TexturePlan::add_neighbours(TileId texture, double texel_px, DrawItem& item
     const bool west = t.offset_u <= 0, east = t.offset_u + t.scale >= 1;
     const bool north = t.offset_v <= 0, south = t.offset_v + t.scale >= 1;
     const auto look = [&](bool touches, TextureSide side, int dx, int dy) {
-        if (touches) item.neighbour_textures[side] = slot_at({texture.level, texture.x + dx, texture.y + dy});
+        if (touches) item.neighbour_textures[side] = wanted_slot_at({texture.level, texture.x + dx, texture.y + dy});
     };
     look(north && west, kSideNorthWest, -1, -1);
     look(north, kSideNorth, 0, -1);
@@ -199,6 +208,7 @@ void TexturePlan::wish_deep(const CutNode& node, const Part& part) {
     for_each_deep_child(node, part, [&](const Part& child) {
         if (!(child.need > 1)) return;
         deep_.push_back({texture_of(node, child.part), child.slot, child.need});
+        mark_wanted(child.slot);
         wish_deep(node, child);
     });
 }

@@ -51,7 +51,8 @@ private:
     void for_each_deep_child(const CutNode& node, const Part& part, const Visit& visit) const;
     void wish_deep(const CutNode& node, const Part& part);
     void emit_part(const CutNode& node, const Part& part, const DrawItem& item, DrawList& out) const;
-    std::int32_t slot_at(TileId texture) const;
+    std::int32_t wanted_slot_at(TileId texture) const;
+    void mark_wanted(std::int32_t slot);
     void add_neighbours(TileId texture, double texel_px, DrawItem& item) const;
 
     const Dataset& dataset_;
@@ -60,6 +61,7 @@ private:
     CutSettings settings_;
     const Residency* residency_ = nullptr;
     std::vector<double> needs_;  ///< by node of the cut; 0: its texture is not wanted
+    std::vector<bool> wanted_;   ///< by texture slot
     std::vector<DeepWish> deep_;
     std::vector<std::int32_t> used_;
     bool fading_ = false;

@@ -1,12 +1,19 @@
 // What is drawn moves continuously with the eye and with time: no vertex pops (docs/lod-and-paging.md, "Morphing").
 #include <gtest/gtest.h>
 
+#include <map>
+#include <set>
+
 #include "tests/runtime/lod/drawn_frame.h"
 #include "tests/runtime/lod/probed_surface.h"
 #include "tests/runtime/lod/selection_support.h"
 
 namespace scree {
 namespace {
+
+/// Where two successive strides of a chain of pages have the same certified error, both are left at once, and any
+/// height in which they differ pops: continuity needs errors that grow with the stride.
+constexpr float kErrorGrowth = 1.25f;
 
 std::vector<glm::dvec2> random_places(test::Random& random, const test::SyntheticTerrain& terrain, int count) {
     const Lattice& l = terrain.lattice();
@@ -130,7 +137,7 @@ struct FlightResult {
 FlightResult fly(test::Random& random, const FlightKind& kind, int worlds) {
     FlightResult result;
     for (int world = 0; world < worlds; ++world) {
-        const auto terrain = test::random_terrain(random, kind.texture_depth);
+        const auto terrain = test::random_terrain(random, kind.texture_depth, kErrorGrowth);
         const Lattice& l = terrain.lattice();
         const double top = terrain.dataset().max_height_m, extent_m = l.spacing_m * static_cast<double>(l.cells_x);
         for (int flight = 0; flight < 3; ++flight) {
@@ -195,6 +202,117 @@ TEST(ContinuityInSpace, WithoutMorphingTheSameFlightsFindPops) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());
     EXPECT_GT(fly(random, {.morph = false}, 4).pops, 20);
+}
+
+// Pages that were missing come in time, coarse before fine, several levels within the time of one or at once.
+TEST(ContinuityInTime, WhatComesLateGrowsOutOfItsStandInsShapeAndSettlesToThePictureWithoutGrowth) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    double moved_m = 0;
+    int grown = 0, pops_at_once = 0;
+    for (int world = 0; world < 40; ++world) {
+        const auto terrain = test::random_terrain(random, world % 3 == 2 ? 3 : 0, kErrorGrowth);
+        const Lattice& l = terrain.lattice();
+        const CpuArena arena = test::arena_of(terrain);
+        const test::ProbedSurface surface(terrain, arena);
+        const auto places = random_places(random, terrain, 80);
+        const double range_m = terrain.dataset().max_height_m - terrain.dataset().min_height_m;
+        const double threshold_m = 1e-3 + 2e-4 * range_m;
+        const glm::dvec3 eye(l.x_m(test::uniform_real(random, 0, static_cast<double>(l.cells_x))),
+                             l.y_m(test::uniform_real(random, 0, static_cast<double>(l.cells_y))),
+                             terrain.dataset().max_height_m + test::uniform_real(random, 0, 500));
+        const auto views = test::views_all_round(eye);
+        // The pages that are late, by when they come; what lies under a missing page comes no sooner.
+        std::map<TileId, double> late;
+        for (const TileId id : terrain.tiles()) {
+            if (id.level == 0) continue;
+            const auto parent = late.find(parent_of(id));
+            double at = test::uniform(random, 0, 5) == 0 ? test::uniform_real(random, 0, 2) : -1;
+            if (parent != late.end()) at = parent->second + (world % 2 == 0 ? 0 : test::uniform_real(random, 0, 0.5));
+            if (at >= 0) late[id] = at;
+        }
+        SelectionSettings settings = test::with_tau(std::exp(test::uniform_real(random, 0, 5)));
+        settings.growth_s = 0.5;
+        Selector selector(terrain.dataset());
+        bool growing = false;
+        const auto select = [&](double now_s) -> const Selection& {
+            test::FakeResidency residency(terrain);
+            residency.add_all();
+            for (const auto& [id, at] : late) {
+                if (at <= now_s)
+                    residency.set_arrived(id, at);
+                else
+                    residency.remove(id);
+            }
+            residency.set_now(now_s);
+            return selector.select(views, settings, residency);
+        };
+        const auto heights = [&](double now_s) {
+            const Selection& s = select(now_s);
+            growing = growing || s.growing;
+            return surface.heights_m(test::drawn_together(s), places, eye, 0);
+        };
+        const auto first = heights(0);
+        const double end_s = 3 + 0.5 * (l.deepest_level + 2);
+        for (int k = 0; k < 60; ++k) {
+            const Jump pop = pop_between(end_s * k / 60, end_s * (k + 1) / 60, 1e-9, threshold_m, heights);
+            ASSERT_EQ(pop.height_m, 0) << "world " << world << ", second " << end_s * k / 60;
+        }
+        moved_m = std::max(moved_m, greatest_jump(first, heights(end_s)).height_m);
+        grown += growing ? 1 : 0;
+        const Selection settled = select(end_s);
+        ASSERT_FALSE(settled.growing);
+        settings.growth_s = 0;
+        ASSERT_TRUE(test::same_selection(settled, select(end_s)));
+        for (int k = 0; k < 60; ++k)
+            pops_at_once += pop_between(end_s * k / 60, end_s * (k + 1) / 60, 1e-9, threshold_m, heights).height_m > 0;
+    }
+    EXPECT_GT(grown, 15);
+    EXPECT_GT(moved_m, 1);
+    EXPECT_GT(pops_at_once, 30);  // the same arrivals without growth
+}
+
+TEST(ContinuityInTime, ATextureThatComesLateIsBlendedInOverItsAncestors) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    const auto terrain = test::random_terrain(random, 3);
+    const Lattice& l = terrain.lattice();
+    const glm::dvec3 middle(l.x_m(static_cast<double>(l.cells_x) / 2), l.y_m(static_cast<double>(l.cells_y) / 2),
+                            terrain.dataset().max_height_m + 20);
+    const auto views = test::views_all_round(middle);
+    SelectionSettings settings = test::with_tau(1);
+    settings.growth_s = 2;
+    test::FakeResidency residency(terrain);
+    residency.add_all();
+    for (const TileId id : terrain.textures())
+        if (id.level > 0) residency.set_texture_arrived(id, 10);
+    Selector selector(terrain.dataset());
+    std::int64_t fading = 0;
+    for (const double age_s : {0.0, 0.5, 1.0, 1.75, 2.0, 3.0}) {
+        residency.set_now(10 + age_s);
+        const Selection& s = selector.select(views, settings, residency);
+        ASSERT_EQ(s.growing, age_s < 2);
+        for (const DrawItem& item : test::drawn_together(s)) {
+            const TileId texture = terrain.textures()[static_cast<std::size_t>(item.texture.slot)];
+            if (texture.level == 0 || age_s >= 2) {
+                ASSERT_EQ(item.texture_share, 1);
+                continue;
+            }
+            ASSERT_EQ(item.texture_share, static_cast<float>(age_s / 2));
+            const TileId coarse = terrain.textures()[static_cast<std::size_t>(item.coarse_texture.slot)];
+            ASSERT_EQ(coarse, parent_of(texture));
+            // Both lie at the same place: scale and offset differ by the quadrant.
+            const double extent = std::ldexp(static_cast<double>(l.tile_extent(0)), -coarse.level);
+            const double cell = static_cast<double>(l.tile_extent(item.tile.level));
+            ASSERT_EQ(static_cast<double>(item.coarse_texture.scale) * extent, cell);
+            ASSERT_EQ(static_cast<double>(item.coarse_texture.offset_u) * extent,
+                      static_cast<double>(item.tile.x) * cell - static_cast<double>(coarse.x) * extent);
+            ASSERT_EQ(static_cast<double>(item.coarse_texture.offset_v) * extent,
+                      static_cast<double>(item.tile.y) * cell - static_cast<double>(coarse.y) * extent);
+            ++fading;
+        }
+    }
+    EXPECT_GT(fading, 10);
 }
 
 }  // namespace

@@ -41,7 +41,7 @@ double ProbedSurface::height_m(const DrawItem& item, glm::dvec2 place, glm::dvec
         const double x = l.x_m(static_cast<double>(corner.i) + i * step) - eye.x;
         const double y = l.y_m(static_cast<double>(corner.j) + j * step) - eye.y;
         const double side = step * l.spacing_m;
-        const double height_n = morphed_height(v.height_n, v.next_n, morph.weight);
+        const double height_n = static_cast<double>(morphed_height(v, morph));
         return terrain_.dataset().height_m(height_n) -
                (x * x + y * y + static_cast<double>(morph.weight) * morph.reach_squared * side * side) * half_curvature;
     };

@@ -22,7 +22,7 @@ std::uint64_t hash(std::uint64_t seed, std::int64_t a, std::int64_t b, int octav
 }  // namespace
 
 SyntheticTerrain::SyntheticTerrain(const TerrainShape& shape, HeightFunction height, PresenceFunction present)
-    : height_(std::move(height)), present_(std::move(present)) {
+    : height_(std::move(height)), present_(std::move(present)), error_growth_(shape.error_growth) {
     auto lattice =
         make_lattice(300000.5, 2700000.25, shape.spacing_m, shape.cells_x, shape.cells_y, shape.tile_cells_log2);
     EXPECT_TRUE(lattice.ok());
@@ -75,6 +75,11 @@ bool SyntheticTerrain::present(std::int64_t i, std::int64_t j) const {
     return i >= 0 && j >= 0 && i < lattice().cells_x && j < lattice().cells_y && (!present_ || present_(i, j));
 }
 
+void SyntheticTerrain::grow_errors(HeightBounds& bounds) const {
+    for (std::size_t g = 1; g < static_cast<std::size_t>(lattice().tile_cells_log2); ++g)
+        bounds.error_n[g] = std::max(bounds.error_n[g], error_growth_ * bounds.error_n[g - 1]);
+}
+
 bool SyntheticTerrain::make_tile(TileId id) {
     const Lattice& l = lattice();
     const int n = l.tile_cells_log2;
@@ -99,6 +104,7 @@ bool SyntheticTerrain::make_tile(TileId id) {
         const auto vertices = present_vertices(tile.presence, n);
         const auto errors = leaf_errors({tile.samples.data(), vertices.empty() ? nullptr : vertices.data(), n});
         for (std::size_t g = 0; g < errors.size(); ++g) own.error_n[g] = round_up_to_float(errors[g]);
+        grow_errors(own);
         stored_.emplace(id, std::move(tile));
         return true;
     }
@@ -131,8 +137,7 @@ bool SyntheticTerrain::make_tile(TileId id) {
                                    {leaf->second.samples.data(), vertices.empty() ? nullptr : vertices.data(), n}));
         }
     own.error_n[static_cast<std::size_t>(n - 1)] = round_up_to_float(worst);
-    for (std::size_t g = 1; g < static_cast<std::size_t>(n); ++g)
-        own.error_n[g] = std::max(own.error_n[g], own.error_n[g - 1]);
+    grow_errors(own);
     stored_.emplace(id, std::move(tile));
     return true;
 }
@@ -207,8 +212,9 @@ PresenceFunction with_absent_discs(Random& random, const TerrainShape& shape, in
     };
 }
 
-SyntheticTerrain random_terrain(Random& random, int texture_depth) {
+SyntheticTerrain random_terrain(Random& random, int texture_depth, float error_growth) {
     TerrainShape shape;
+    shape.error_growth = error_growth;
     shape.tile_cells_log2 = uniform(random, 2, 4);
     const int m = 1 << shape.tile_cells_log2;
     const int tiles = 1 << uniform(random, 2, shape.tile_cells_log2 == 4 ? 3 : 4);  // 3 to 5 levels with one root

@@ -32,6 +32,8 @@ struct TerrainShape {
     /// tile_cells_log2.
     int texture_depth = 0;
     int texture_size_log2 = 4;
+    /// Certified errors grow by this factor at least from stride to stride (raising them is safe).
+    float error_growth = 1;
 };
 
 class SyntheticTerrain {
@@ -57,11 +59,13 @@ public:
 
 private:
     bool make_tile(TileId id);
+    void grow_errors(HeightBounds& bounds) const;
     void make_textures();
 
     Dataset dataset_;
     HeightFunction height_;
     PresenceFunction present_;
+    float error_growth_;
     std::unordered_map<TileId, HeightTile, TileIdHash> stored_;
     std::unordered_map<TileId, std::int32_t, TileIdHash> indices_, texture_indices_;
     std::vector<TileId> ids_, texture_ids_;
@@ -72,7 +76,7 @@ HeightFunction rough_heights(std::uint64_t seed, int amplitude);
 /// Absent discs over a part of the extent.
 PresenceFunction with_absent_discs(Random& random, const TerrainShape& shape, int discs);
 /// Of all sizes, with and without absent areas, one or several roots; heights from smooth to white noise.
-SyntheticTerrain random_terrain(Random& random, int texture_depth = 0);
+SyntheticTerrain random_terrain(Random& random, int texture_depth = 0, float error_growth = 1);
 inline constexpr int kDeepTextures = 99;  ///< for texture_depth: as deep as can be
 /// Anywhere in, over or beside the terrain, looking at a point of it.
 Camera random_camera(Random& random, const SyntheticTerrain& terrain);
