@@ -39,6 +39,7 @@ Result<std::unique_ptr<Display>> Display::create(const Scene& scene, const Displ
     if (auto ok = display->resize(o.width_px, o.height_px); !ok) return ok.error();
     if (o.keep_heights) display->arena_ = std::make_unique<CpuArena>(d, scene.memory().height_slots);
     display->settings_ = scenery(d);
+    display->renderer_->warm_up(display->settings_, *display->target_);
     return display;
 }
 

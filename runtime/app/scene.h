@@ -22,7 +22,7 @@ struct SceneOptions {
     double texture_tau_px = 1;
     Curvature curvature = Curvature::automatic;
     bool morph = true;       ///< false: discrete levels
-    double growth_s = 0.15;  ///< in which a tile that came late grows out of what stood in for it
+    double growth_s = 0.08;  ///< a level, in which a tile that came late grows out of what stood in for it
     double foresight_s = 1;  ///< how far ahead of the eye tiles are fetched; 0: not at all
     int loader_threads = 2;
     int latency_ms = 0;
