@@ -38,7 +38,7 @@ void expect_next_heights(test::Random& random, int n, int amplitude) {
 
 TEST(VertexSlot, HoldsTheGridOnly) {
     EXPECT_EQ(slot_vertex_count(5), 1089u);
-    EXPECT_EQ(slot_bytes(5), 8712u);
+    EXPECT_EQ(slot_bytes(5), 13068u);
 }
 
 TEST(VertexSlot, NextHeightsLieOnTheNextLevelsSurface) {

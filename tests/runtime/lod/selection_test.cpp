@@ -3,7 +3,24 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+#include <new>
+
 #include "tests/runtime/lod/selection_support.h"
+
+namespace {
+
+std::int64_t allocations = 0;
+
+}  // namespace
+
+void* operator new(std::size_t size) {
+    ++allocations;
+    if (void* memory = std::malloc(size)) return memory;
+    throw std::bad_alloc();
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace scree {
 namespace {
@@ -40,6 +57,25 @@ TEST(Selection, IsTheSameTwiceAndAfterAnyOtherCallsBetween) {
             ASSERT_TRUE(test::same_selection(first, Selector(terrain.dataset()).select(views, settings, residency)));
         }
     }
+}
+
+TEST(Selection, AllocatesNothingOnceItsBuffersHaveTheirSize) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    for (int world = 0; world < 12; ++world) {
+        const auto terrain = test::random_terrain(random, world % 3 == 0 ? test::kDeepTextures : 3);
+        Selector selector(terrain.dataset());
+        test::FakeResidency fake(terrain);
+        fake.add_all();
+        const Residency& residency = fake;
+        const std::vector<Camera> views{test::random_camera(random, terrain), test::random_camera(random, terrain)};
+        const SelectionSettings settings = random_settings(random, terrain);
+        for (int k = 0; k < 2; ++k) selector.select(views, settings, residency);
+        const std::int64_t before = allocations;
+        for (int k = 0; k < 3; ++k) selector.select(views, settings, residency);
+        EXPECT_EQ(allocations, before);
+    }
+    EXPECT_GT(allocations, 0);
 }
 
 TEST(Selection, OnceCompleteDoesNotDependOnWhatElseIsResident) {
