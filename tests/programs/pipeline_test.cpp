@@ -72,7 +72,7 @@ TEST(Pipeline, NodataTagOfAnIntegerFileIsVoidAndHeightsStayLossless) {
         for (int i = 10; i < 33; ++i) grid.at(i, j) = -32768;
     write_heights_i16(folder.file("d.tif"), grid, {}, "-32768");
     build_store_from({folder.file("d.tif")}, folder.file("d.scree"));
-    const auto info = expect_sound_store(folder.file("d.scree"), {1}, {"2M"});
+    const auto info = expect_sound_store(folder.file("d.scree"), {1}, {"4M"});
     EXPECT_EQ(info["present_cells"], 69 * 89 - 24 * 21);
     EXPECT_EQ(info["height_quantum_m"], 1.0);
     EXPECT_EQ(info["height_quantum_error_m"], 0.0);
@@ -91,7 +91,7 @@ TEST(Pipeline, HeightScaleAndOffsetOfAnUnplacedIntegerFile) {
     write_heights_u16(folder.file("d.tif"), grid, nullptr);
     build_store_from({folder.file("d.tif"), "--spacing", "160", "--height-scale", "0.1", "--height-offset", "-50"},
                      folder.file("d.scree"));
-    const auto info = expect_sound_store(folder.file("d.scree"), {0.5, 2}, {"2M"});
+    const auto info = expect_sound_store(folder.file("d.scree"), {0.5, 2}, {"4M"});
     const auto [low, high] = std::minmax_element(grid.z.begin(), grid.z.end());
     EXPECT_EQ(info["spacing_m"], 160.0);
     EXPECT_EQ(info["crs"], "");
@@ -108,7 +108,7 @@ TEST(Pipeline, ImageryOfAnotherExtentAndResolution) {
     write_image(folder.file("i.tif"), 251, 97, 3, 8, &partly, patchwork);
     build_store_from({folder.file("d.tif"), "--imagery", folder.file("i.tif"), "--texture-size", "64"},
                      folder.file("d.scree"));
-    const auto info = expect_sound_store(folder.file("d.scree"), {1}, {"2M"});
+    const auto info = expect_sound_store(folder.file("d.scree"), {1}, {"4M"});
     EXPECT_EQ(info["has_imagery"], true);
     EXPECT_LE(info["texel_m"].get<double>(), 1.1 * 3.7);
     EXPECT_GT(info["texel_m"].get<double>(), 1.1 * 3.7 / 2);
@@ -124,7 +124,7 @@ TEST(Pipeline, ImageryFinerThanEightTexelsACellMakesTexturesDeeperThanHeights) {
     build_store_from(
         {folder.file("d.tif"), "--imagery", folder.file("i.tif"), "--tile-size", "17", "--texture-size", "16"},
         folder.file("d.scree"));
-    const auto info = expect_sound_store(folder.file("d.scree"), {1}, {"2M"});
+    const auto info = expect_sound_store(folder.file("d.scree"), {1}, {"4M"});
     EXPECT_GE(info["spacing_m"].get<double>() / info["texel_m"].get<double>(), 8.0);
     EXPECT_GT(info["texture_levels"].get<int>(), info["levels"].get<int>());
 }
@@ -141,7 +141,7 @@ TEST(Pipeline, GreyAlphaAndSixteenBitImagery) {
             return patchwork(x, y, c) << (kind.bits - 8);
         });
         build_store_from({folder.file("d.tif"), "--imagery", folder.file("i.tif"), "--force"}, folder.file("d.scree"));
-        expect_sound_store(folder.file("d.scree"), {1}, {"2M"});
+        expect_sound_store(folder.file("d.scree"), {1}, {"4M"});
     }
 }
 

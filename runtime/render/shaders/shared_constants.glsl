@@ -1,7 +1,7 @@
 // Valid as GLSL and as C++: every program starts with this file, and shader_constants.h includes it.
 
 // Vertex attributes. The first advances by vertex, the others by draw (divisor 1); the last three are of blended draws.
-const int kHeightAttribute = 0;      // vec2: heights in quanta {own, on the next coarser surface}
+const int kHeightAttribute = 0;      // vec3: heights in quanta {own, next coarser, rim}: see SlotVertex
 const int kTileAttribute = 1;        // ivec4: lattice i, j of the north-west corner, cells between samples, first vertex
 const int kTextureAttribute = 2;     // vec4: layer, scale, offset u, offset v
 const int kPatternAttribute = 3;     // ivec2: samples between vertices, edges thinned by 2 (EdgeMask)

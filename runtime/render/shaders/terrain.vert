@@ -1,6 +1,6 @@
 // One tile vertex. kTileSamples (m + 1), and SCREE_BLENDED for draws that look at several textures, are set when the
 // program is built.
-layout(location = kHeightAttribute) in vec2 heights_n;
+layout(location = kHeightAttribute) in vec3 heights_n;
 layout(location = kTileAttribute) in ivec4 tile;
 layout(location = kTextureAttribute) in vec4 placement;
 
@@ -31,8 +31,8 @@ flat out uvec4 neighbour_textures;
 void main() {
     int local = gl_VertexID - tile.w;
     ivec2 sample_index = ivec2(local % kTileSamples, local / kTileSamples);
-    vec2 morph = vertex_morph(sample_index);
-    vec3 flat_m = flat_position(tile.xy + sample_index * tile.z, morphed_height(heights_n, morph.x));
+    vec3 morph = vertex_morph(sample_index);
+    vec3 flat_m = flat_position(tile.xy + sample_index * tile.z, morphed_height(heights_n, morph));
     relative_m = curved_position(flat_m, curvature_drop(flat_m, morph_reach_m2(morph.x, morph.y, tile.z)));
     haze_density = mean_haze_density(flat_m.z);  // air follows the curve of the ground
     vec2 tile_position = vec2(sample_index) / float(kTileCells);

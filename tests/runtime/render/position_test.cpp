@@ -210,7 +210,7 @@ protected:
         glVertexArrayVertexBuffer(name, 0, arena_.buffer(), 0, sizeof(SlotVertex));
         glEnableVertexArrayAttrib(name, shader::kHeightAttribute);
         glVertexArrayAttribBinding(name, shader::kHeightAttribute, 0);
-        glVertexArrayAttribFormat(name, shader::kHeightAttribute, 2, GL_FLOAT, GL_FALSE, 0);
+        glVertexArrayAttribFormat(name, shader::kHeightAttribute, 3, GL_FLOAT, GL_FALSE, 0);
         glVertexAttrib4f(shader::kTextureAttribute, 0, 1, 0, 0);
     }
 
@@ -252,7 +252,7 @@ protected:
         const SlotVertex& v = slots_[t][static_cast<std::size_t>(j * lattice_.tile_samples() + i)];
         return frame.position(static_cast<std::int32_t>(corner.i + i * step),
                               static_cast<std::int32_t>(corner.j + j * step),
-                              morphed_height(v.height_n, v.next_n, morph.weight), frame.morph_reach_m2(morph, step));
+                              morphed_height(v, morph), frame.morph_reach_m2(morph, step));
     }
 
     Lattice lattice_;
