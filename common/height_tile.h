@@ -14,15 +14,19 @@ namespace scree {
 /// |n| < 2^23: n, n/2 and differences of two n are exact in float32.
 inline constexpr std::int32_t kMaxHeightUnits = (1 << 23) - 1;
 
+/// Errors of successive levels differ by this factor at least: a level whose error is that of the next would be left as
+/// soon as it is reached, and its morph would be a jump (Scree lod, C15).
+inline constexpr float kErrorGrowth = 1.25f;
+
 /// Height range and certified errors of the terrain under one tile's extent, in quanta.
 struct HeightBounds {
     std::int32_t min_n = 0;  ///< over every sample that can be drawn in the extent
     std::int32_t max_n = 0;
     /// error_n[g]: maximum vertical distance between the finest stored surface over present cells and the tile's
     /// surface drawn at geomip level g (stride 2^g samples of the tile), with any of its border vertices of ratio 2
-    /// removed. Never falls with g; never below a child's value at the same absolute stride. g = 0 .. tile_cells_log2 -
-    /// 1: a tile is drawn with at least 2 x 2 cells. Rounded up. For the deepest level error_n[0] counts removed border
-    /// vertices only: drawn whole, the finest surface has error 0.
+    /// removed. At least kErrorGrowth times that of g - 1; never below a child's value at the same absolute stride. g =
+    /// 0 .. tile_cells_log2 - 1: a tile is drawn with at least 2 x 2 cells. Rounded up. For the deepest level
+    /// error_n[0] counts removed border vertices only: drawn whole, the finest surface has error 0.
     std::array<float, kMaxTileCellsLog2> error_n{};
 
     friend bool operator==(const HeightBounds&, const HeightBounds&) = default;

@@ -11,9 +11,6 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Errors of successive levels are taken to differ by this factor at least: a level that is left as soon as it is
-/// reached would pop (Scree lod, C15).
-constexpr double kLevelGrowth = 1.25;
 /// Before a page is split for its texture it must have become dense enough for its children: over this many levels a
 /// doubling of the need.
 constexpr double kTextureApproach = 4;
@@ -106,7 +103,7 @@ void Cut::judge(CutNode& node, double parent_error_m) const {
     } else {
         for (int geomip = 1; geomip < lattice_.tile_cells_log2; ++geomip) {
             const double exact_m = error_m(node, geomip);
-            double coarser_m = std::max(exact_m, kLevelGrowth * finer_m);
+            double coarser_m = std::max(exact_m, static_cast<double>(kErrorGrowth) * finer_m);
             // Never above the parent's at the same stride, so that a child is never held finer than its parent was.
             if (geomip == 1) coarser_m = std::min(coarser_m, std::max(exact_m, parent_error_m));
             if (coarser_m > allowed_m) {
@@ -385,6 +382,14 @@ Level Cut::limit_beside(const CutNode& node) const {
     return node.level + level_of_share(std::clamp(kTextureApproach * node.doublings, 0.0, 1.0));
 }
 
+// Has a split page nothing of its own on part of a side, because it is absent or out of view? There it goes on to speak
+// for itself.
+bool Cut::is_open(const CutNode& node, int side) {
+    return std::any_of(kTouching[static_cast<std::size_t>(side)].begin(),
+                       kTouching[static_cast<std::size_t>(side)].end(),
+                       [&](int q) { return node.children[static_cast<std::size_t>(q)] < 0; });
+}
+
 // Applies the rules between a page and those beside it, both ways. A split page stands for what it would be drawn at as
 // a leaf: what has been asked of its neighbours for its sake is still asked once it is split, or they would jump.
 void Cut::constrain_neighbours(std::int32_t index) {
@@ -397,38 +402,37 @@ void Cut::constrain_neighbours(std::int32_t index) {
     if (start.id.level == lattice_.deepest_level && settings_.tau_px * start.metres_per_px < start.finest_error_m)
         limit = std::min(limit, level_of_share(settings_.tau_px * start.metres_per_px / start.finest_error_m));
     Level own_limit = level;
+    const int page_level = start.page_level;
+    // Anything may move in memory when a page is split: nodes are named by their index.
+    const auto at = [&](std::int32_t k) -> CutNode& { return nodes_[static_cast<std::size_t>(k)]; };
     for (int d = 0; d < 4; ++d) {
         for (;;) {
             const std::int32_t other = neighbour(index, d);
             if (other < 0) break;
-            // Anything may move in memory below.
-            const CutNode own = nodes_[static_cast<std::size_t>(index)];
-            const CutNode beside = nodes_[static_cast<std::size_t>(other)];
-            if (!beside.visible()) break;
-            const bool larger = beside.id.level < own.id.level;
-            if (larger) {
-                own_limit = std::min(own_limit, beside.level);
-                if (leaf && beside.level > limit && lower(other, limit)) continue;
+            if (at(other).page_level < page_level) {
+                own_limit = std::min(own_limit, at(other).level);
+                const bool asks = leaf || is_open(at(index), d);
+                if (asks && at(other).level > limit && lower(other, limit)) continue;
                 break;
             }
-            own_limit = std::min(own_limit, beside.level + allowance(own, beside));
-            if (beside.parent >= 0 && beside.parent != own.parent)
-                own_limit = std::min(own_limit, limit_beside(nodes_[static_cast<std::size_t>(beside.parent)]));
-            const Level theirs = level + allowance(beside, own);
-            if (beside.level > theirs) lower(other, theirs);
-            if (beside.split) {
+            own_limit = std::min(own_limit, at(other).level + allowance(at(index), at(other)));
+            if (const std::int32_t above = at(other).parent; above >= 0 && above != at(index).parent)
+                own_limit = std::min(own_limit, limit_beside(at(above)));
+            const Level theirs = level + allowance(at(other), at(index));
+            if (at(other).level > theirs) lower(other, theirs);
+            if (at(other).split) {
+                const Level children_limit = limit_beside(at(index));
                 for (const int q : kTouching[static_cast<std::size_t>(opposite(d))])
-                    if (const std::int32_t child = beside.children[static_cast<std::size_t>(q)];
-                        child >= 0 && nodes_[static_cast<std::size_t>(child)].visible() &&
-                        nodes_[static_cast<std::size_t>(child)].level > limit_beside(own))
-                        lower(child, limit_beside(own));
+                    if (const std::int32_t child = at(other).children[static_cast<std::size_t>(q)];
+                        child >= 0 && at(child).level > children_limit)
+                        lower(child, children_limit);
                 if (leaf)
                     for_each_leaf_on(other, opposite(d), [&](std::int32_t smaller) {
-                        own_limit = std::min(own_limit, nodes_[static_cast<std::size_t>(smaller)].level + kOneLevel);
+                        own_limit = std::min(own_limit, at(smaller).level + kOneLevel);
                     });
                 break;
             }
-            if (leaf && beside.level > limit && lower(other, limit)) continue;
+            if (leaf && at(other).level > limit && lower(other, limit)) continue;
             break;
         }
         if (leaf && nodes_[static_cast<std::size_t>(index)].split) return;

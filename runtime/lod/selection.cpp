@@ -17,6 +17,8 @@ constexpr std::int64_t kNoLimit = std::numeric_limits<std::int64_t>::max();
 
 /// Where slots bind, tolerances grow by eighths of an octave: steps too small to be seen.
 constexpr int kCoarseningSteps = 8;
+/// Of the slots, one in so many is not planned with once they bind.
+constexpr std::int64_t kReserve = 32;
 constexpr int kMostCoarsening = 50 * kCoarseningSteps;
 /// What a tolerance of 0 is taken for once slots bind.
 constexpr double kLeastBoundTolerance = 1.0 / 1024;
@@ -85,19 +87,35 @@ struct Selector::Impl {
         const CutSettings cut = cut_settings(s, geometry, texture);
         result.tau_effective_px = cut.tau_px;
         result.texture_tau_effective_px = cut.texture_tau_px;
-        const bool fits = plan.refine(views, cut, residency);
+        pages_fit_ = plan.refine(views, cut, residency);
         result.refine_steps += plan.steps();
-        if (!fits) return false;
+        if (!pages_fit_) return false;
         return textures.wish(plan, views, cut, residency) <= s.texture_slots;
     }
 
     // The finest plan that fits: textures first, as they take most of the memory, then geometry.
-    void make_plan(const SelectionSettings& s, const Residency& residency) {
-        if (try_plan(s, residency, 0, 0)) return;
+    void make_plan(const SelectionSettings& all, const Residency& residency) {
+        if (try_plan(all, residency, 0, 0)) return;
         result.budget_limited = true;
+        // A few slots are left for what shows that nothing finer fits.
+        SelectionSettings s = all;
+        s.height_slots -= s.height_slots / kReserve;
+        s.texture_slots -= s.texture_slots / kReserve;
         texture_steps = least_step(texture_steps, [&](int t) { return try_plan(s, residency, kMostCoarsening, t); });
+        if (texture_steps > 0) keep_proof(s, residency, kMostCoarsening, texture_steps - 1);
         geometry_steps = least_step(geometry_steps, [&](int g) { return try_plan(s, residency, g, texture_steps); });
+        if (geometry_steps > 0) keep_proof(s, residency, geometry_steps - 1, texture_steps);
         try_plan(s, residency, geometry_steps, texture_steps);
+    }
+
+    // What is known of the plan that is too fine by a step: were its pages lost, it would seem to fit, be asked for,
+    // and be given up again, for ever.
+    void keep_proof(const SelectionSettings& s, const Residency& residency, int geometry, int texture) {
+        try_plan(s, residency, geometry, texture);
+        for (const CutNode& node : plan.nodes())
+            if (node.split) result.standing_heights.push_back(node.slot);
+        if (pages_fit_ && residency.has_textures) textures.hand_over(plan, result.standing_textures, result.requests);
+        result.requests.clear();
     }
 
     void request_missing(const SelectionSettings& settings, const Residency& residency) {
@@ -214,6 +232,7 @@ struct Selector::Impl {
 
 private:
     bool use_standing_ = false;
+    bool pages_fit_ = false;
 };
 
 Selector::Selector(const Dataset& dataset) : impl_(std::make_unique<Impl>(dataset)) {}

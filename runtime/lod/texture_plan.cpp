@@ -59,27 +59,19 @@ std::int64_t TexturePlan::wish(const Cut& cut, std::span<const LodView> views, c
     needs_.assign(nodes.size(), 0);
     wanted_.assign(residency.textures.headers.size(), false);
     std::int64_t count = dataset_.lattice.root_rows * dataset_.lattice.root_columns;
+    // Each page by its own nearest point: what a page wants its ancestors want the more, and nothing depends on how far
+    // the pages below it are known.
     for (std::size_t k = 0; k < nodes.size(); ++k) {
-        const CutNode& leaf = nodes[k];
-        if (leaf.split || !leaf.visible()) continue;
-        const int up = wanted_steps_up(leaf);
-        std::int32_t index = static_cast<std::int32_t>(k);
-        for (int step = 0; step < up; ++step) index = nodes[static_cast<std::size_t>(index)].parent;
-        for (; index >= 0; index = nodes[static_cast<std::size_t>(index)].parent) {
-            const CutNode& node = nodes[static_cast<std::size_t>(index)];
-            const double need = node.id.level == 0
-                                    ? kInfinity
-                                    : texel_m(node.id.level - 1) / leaf.texel_per_px / settings_.texture_tau_px;
-            double& known = needs_[static_cast<std::size_t>(index)];
-            if (known >= need) break;  // the ancestors have been reached from as near before
-            if (known == 0) {
-                if (node.id.level > 0) ++count;
-                mark_wanted(node.texture_slot);
-            }
-            known = need;
-        }
-        if (up == 0 && deeper_than_heights() && leaf.id.level == dataset_.lattice.deepest_level)
-            wish_deep(leaf, {{}, leaf.texture_slot, leaf.texture_need});
+        const CutNode& node = nodes[k];
+        const int level = node.id.level;
+        if (level > dataset_.texture_deepest_level) continue;
+        const double need = level == 0 ? kInfinity : texel_m(level - 1) / node.texel_per_px / settings_.texture_tau_px;
+        if (!(need > 1)) continue;
+        needs_[k] = need;
+        if (level > 0) ++count;
+        mark_wanted(node.texture_slot);
+        if (!node.split && deeper_than_heights() && level == dataset_.lattice.deepest_level)
+            wish_deep(node, {{}, node.texture_slot, node.texture_need});
     }
     return count + static_cast<std::int64_t>(deep_.size());
 }

@@ -215,6 +215,7 @@ private:
         const auto errors = leaf_errors(finest);
         for (int g = 0; g < n_; ++g)
             record.bounds.error_n[static_cast<std::size_t>(g)] = round_up_to_float(errors[static_cast<std::size_t>(g)]);
+        let_errors_grow(record.bounds);
 
         const std::int64_t i = column * m_, j = band.band * m_;
         for (int level = 0; level < lattice_.deepest_level; ++level) {
@@ -229,6 +230,14 @@ private:
         tile.header.own = record.bounds;
         record.payload = encode_height_tile(tile, n_, HeightCodec::plane);
         return record;
+    }
+
+    // A parent's finest level has the error of its children's second: the growth goes on from level to level.
+    void let_errors_grow(HeightBounds& bounds) const {
+        for (int g = 1; g < n_; ++g) {
+            float& error = bounds.error_n[static_cast<std::size_t>(g)];
+            error = std::max(error, kErrorGrowth * bounds.error_n[static_cast<std::size_t>(g - 1)]);
+        }
     }
 
     Result<void> emit_deepest(const LevelBand& band) {
@@ -286,10 +295,7 @@ private:
         }
         float& coarsest = record.bounds.error_n[static_cast<std::size_t>(n_ - 1)];
         coarsest = round_up_to_float(parent.coarsest_error);
-        for (int g = 1; g < n_; ++g) {
-            float& error = record.bounds.error_n[static_cast<std::size_t>(g)];
-            error = std::max(error, record.bounds.error_n[static_cast<std::size_t>(g - 1)]);
-        }
+        let_errors_grow(record.bounds);
         tile.header.child_mask = parent.child_mask;
         tile.header.own = record.bounds;
         tile.header.children = parent.children;

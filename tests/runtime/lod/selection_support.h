@@ -50,7 +50,6 @@ inline bool same_selection(const Selection& a, const Selection& b) {
     return same_picture(a, b) &&
            std::equal(a.requests.begin(), a.requests.end(), b.requests.begin(), b.requests.end(), same_request) &&
            a.planned_heights == b.planned_heights && a.planned_textures == b.planned_textures &&
-           a.standing_heights == b.standing_heights && a.standing_textures == b.standing_textures &&
            std::tuple(a.tau_effective_px, a.texture_tau_effective_px, a.complete, a.growing, a.budget_limited) ==
                std::tuple(b.tau_effective_px, b.texture_tau_effective_px, b.complete, b.growing, b.budget_limited);
 }

@@ -98,6 +98,10 @@ TEST(Selection, OnceCompleteDoesNotDependOnWhatElseIsResident) {
             planned.add_roots();
             for (const TileId id : test::planned_tiles(terrain, full, TileKind::height)) planned.add(id);
             for (const TileId id : test::planned_tiles(terrain, full, TileKind::texture)) planned.add_texture(id);
+            for (const std::int32_t slot : full.standing_heights)
+                planned.add(terrain.tiles()[static_cast<std::size_t>(slot)]);
+            for (const std::int32_t slot : full.standing_textures)
+                planned.add_texture(terrain.textures()[static_cast<std::size_t>(slot)]);
             ASSERT_TRUE(test::same_selection(full, selector.select({&camera, 1}, settings, planned)));
             test::FakeResidency more = planned;
             for (const TileId id : terrain.tiles())
@@ -128,13 +132,17 @@ TEST(Selection, FillingItsRequestsLeadsFromTheRootsToTheFullCutWithinTheSlots) {
             for (; rounds < 100; ++rounds) {
                 const Selection s = selector.select({&camera, 1}, settings, residency);
                 if (s.complete) break;
-                // What is not planned is lost at once: the hardest pager there could be.
+                // What is neither planned nor stands in is lost at once: the hardest pager there could be.
                 test::FakeResidency kept(terrain);
                 kept.add_roots();
                 for (const TileId id : test::planned_tiles(terrain, s, TileKind::height))
                     if (residency.holds(id)) kept.add(id);
                 for (const TileId id : test::planned_tiles(terrain, s, TileKind::texture))
                     if (residency.holds_texture(id)) kept.add_texture(id);
+                for (const std::int32_t slot : s.standing_heights)
+                    kept.add(terrain.tiles()[static_cast<std::size_t>(slot)]);
+                for (const std::int32_t slot : s.standing_textures)
+                    kept.add_texture(terrain.textures()[static_cast<std::size_t>(slot)]);
                 residency = kept;
                 for (const TileRequest& r : s.requests)
                     r.kind == TileKind::height ? residency.add(r.id) : residency.add_texture(r.id);

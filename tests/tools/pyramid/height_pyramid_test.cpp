@@ -187,8 +187,8 @@ private:
                     if ((child_mask >> q & 1) != 0)
                         worst = std::max<double>(worst,
                                                  bounds_.at(child_of(id, q)).error_n[static_cast<std::size_t>(g + 1)]);
-            running = std::max(running, worst);
-            want.error_n[static_cast<std::size_t>(g)] = round_up_to_float(running);
+            running = round_up_to_float(std::max(1.25 * running, worst));
+            want.error_n[static_cast<std::size_t>(g)] = static_cast<float>(running);
             // Whatever the rule, the bound must hold for the surface itself.
             EXPECT_GE(want.error_n[static_cast<std::size_t>(g)], error(id, g, tile->samples));
         }
