@@ -23,7 +23,7 @@ struct Command {
     int (*run)(int, char**);
 };
 
-constexpr std::array<Command, 6> kCommands{{
+constexpr std::array<Command, 7> kCommands{{
     {"synth", "make a mountain landscape to try things on", scree::run_synth},
     {"build", "cut a DEM and an image into a pyramid", scree::run_build},
     {"info", "say what a store holds", scree::run_info},
