@@ -216,9 +216,10 @@ void audit_against(const Dataset& d, const SourceRaster& source, const AuditedFr
                 const glm::dvec3 truth{source.x0 + static_cast<double>(column) * source.dx,
                                        source.y0 - static_cast<double>(row) * source.dy, height_m};
                 const double i = l.i_of(truth.x), j = l.j_of(truth.y);
-                const bool inside =
-                    row > rows.first && row + 1 < rows.end && column > columns.first && column + 1 < columns.end;
-                if (!inside && !tiles.owns(item.tile, i, j, slack_i, slack_j)) continue;
+                // Only a tile's last lines may be another's.
+                if ((row + 1 == rows.end || column + 1 == columns.end) &&
+                    !tiles.owns(item.tile, i, j, slack_i, slack_j))
+                    continue;
                 const double u = std::clamp(i - static_cast<double>(corner.i), 0.0, last);
                 const double v = std::clamp(j - static_cast<double>(corner.j), 0.0, last);
                 const auto px = judge.error_px(truth, drawn, u, v);

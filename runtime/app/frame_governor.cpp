@@ -67,14 +67,9 @@ double FrameGovernor::next(double frame_ms) {
     const int side = excess > kIdle ? 1 : excess < -kIdle ? -1 : 0;
     learn(side, excess);
     if (side == 0) return tau_px_;
-    // From the tau that the times belong to, not from that of steps whose effect is still to be seen; and if those went
-    // too far already, their effect is waited for.
+    // From the tau that the times belong to, not from that of steps whose effect is still to be seen.
     const double goal = log_drawn_ + boldness_ * excess / kElasticity;
-    double step = kShare * (goal - log_tau);
-    if (side > 0)
-        step = std::clamp(step, 0.0, kMostStep);
-    else
-        step = std::clamp(step, -kMostStep, 0.0);
+    const double step = std::clamp(kShare * (goal - log_tau), -kMostStep, kMostStep);
     double tau_px = std::exp(log_tau + step);
     if (side < 0 && tau_px < kFinest_px) tau_px = 0;
     tau_px_ = std::clamp(tau_px, limits_.tau_least_px, std::max(limits_.tau_least_px, limits_.tau_most_px));

@@ -165,15 +165,23 @@ TEST(SourceAudit, ASourceOfAnotherSpacingIsJudgedOnceASample) {
 }
 
 TEST(SourceAudit, SamplesBesideTheTerrainAreNotJudged) {
-    const SyntheticTerrain terrain({}, test::rough_heights(5, 400));
-    Audited a(terrain);
-    Source source(terrain);
-    SourceRaster& r = source.raster;
-    r.x0 -= 3 * r.dx;
-    r.y0 += 3 * r.dy;
-    r.columns = r.rows = 65 + 6;
-    source.heights.assign(static_cast<std::size_t>(r.columns * r.rows), 100);
-    EXPECT_EQ(a.by(source, a.above(), a.finest()).errors.count(), 65 * 65);
+    for (const std::int64_t cells : {64, 61, 57}) {  // tiles that end with it, tiles that reach beyond
+        test::TerrainShape shape;
+        shape.cells_x = shape.cells_y = cells;
+        const SyntheticTerrain terrain(shape, test::rough_heights(5, 400));
+        Audited a(terrain);
+        for (const double spacing : {10.0, 2.5}) {
+            Source source(terrain);
+            SourceRaster& r = source.raster;
+            r.dx = r.dy = spacing;
+            r.x0 -= 3 * r.dx;
+            r.y0 += 3 * r.dy;
+            const auto across = static_cast<std::int64_t>(static_cast<double>(cells) * 10 / spacing) + 1;
+            r.columns = r.rows = across + 6;
+            source.heights.assign(static_cast<std::size_t>(r.columns * r.rows), 100);
+            EXPECT_EQ(a.by(source, a.above(), a.finest()).errors.count(), across * across) << cells << ", " << spacing;
+        }
+    }
 }
 
 TEST(SourceAudit, ASourceThatIsHigherByAMetreIsSeenAndWhatIsStatedIsTakenOff) {
