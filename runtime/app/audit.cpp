@@ -1,9 +1,11 @@
 #include "runtime/app/audit.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <unordered_set>
 
 #include "common/mesh/geometric_error.h"
 #include "common/store/height_codec.h"
@@ -135,6 +137,9 @@ Result<void> audit_frame(const TileStore& store, TileReader& reader, const Audit
 
 namespace {
 
+/// Columns of a source: with so much room for rounding a sample lies on a line of the lattice.
+constexpr double kOnLine = 1e-6;
+
 // Does the sample belong to a cell of four valid ones? Where it does not, nothing is drawn.
 bool is_drawn(const SourceRaster& source, std::int64_t column, std::int64_t row) {
     const auto valid = [&](std::int64_t c, std::int64_t r) {
@@ -146,39 +151,77 @@ bool is_drawn(const SourceRaster& source, std::int64_t column, std::int64_t row)
     return false;
 }
 
+// Which drawn tile a place belongs to: on a line between tiles to one of them, whichever are drawn.
+class TileMap {
+public:
+    TileMap(const Lattice& lattice, const DrawList& draws) : lattice_(lattice) {
+        for (const DrawItem& item : draws) drawn_.insert(item.tile);
+    }
+    bool owns(TileId tile, double i, double j, double slack_i, double slack_j) const {
+        for (const std::int64_t cj : cells_at(j, slack_j))
+            for (const std::int64_t ci : cells_at(i, slack_i))
+                if (const auto found = over(ci, cj)) return *found == tile;
+        return false;
+    }
+
+private:
+    // The cell after a place and the one before: the same unless it is on the line between them.
+    static std::array<std::int64_t, 2> cells_at(double at, double slack) {
+        return {static_cast<std::int64_t>(std::floor(at + slack)), static_cast<std::int64_t>(std::floor(at - slack))};
+    }
+    std::optional<TileId> over(std::int64_t ci, std::int64_t cj) const {
+        if (ci < 0 || cj < 0) return std::nullopt;
+        const TileId finest{lattice_.deepest_level, ci >> lattice_.tile_cells_log2, cj >> lattice_.tile_cells_log2};
+        for (int level = 0; level <= finest.level; ++level)
+            if (const TileId id = ancestor_at(finest, level); drawn_.count(id) != 0) return id;
+        return std::nullopt;
+    }
+
+    const Lattice& lattice_;
+    std::unordered_set<TileId, TileIdHash> drawn_;
+};
+
+/// Samples of a source along one axis: first and one past the last of those between two places, both included, given
+/// in columns.
+struct Range {
+    std::int64_t first, end;
+    Range(double from, double to, std::int64_t count)
+        : first(static_cast<std::int64_t>(std::clamp(std::ceil(from - kOnLine), 0.0, static_cast<double>(count)))),
+          end(static_cast<std::int64_t>(std::clamp(std::floor(to + kOnLine) + 1, 0.0, static_cast<double>(count)))) {}
+};
+
 }  // namespace
 
 void audit_against(const Dataset& d, const SourceRaster& source, const AuditedFrame& frame, double stated_m,
                    ErrorHistogram& errors, double& excess_px) {
     const Lattice& l = d.lattice;
     const Judge judge(frame);
+    const TileMap tiles(l, frame.draws);
+    const double slack_i = kOnLine * source.dx / l.spacing_m, slack_j = kOnLine * source.dy / l.spacing_m;
     DrawnTile drawn(
         l, make_relative_frame(l, d.height_offset_m, d.height_quantum_m, frame.camera.eye, frame.half_curvature));
-    // First sample at or beyond a lattice line, with room for rounding: none is judged twice, none is lost.
-    const auto first_column = [&](std::int64_t i) {
-        const double column = (l.x_m(static_cast<double>(i)) - source.x0) / source.dx;
-        return static_cast<std::int64_t>(
-            std::clamp(std::ceil(column - 1e-6), 0.0, static_cast<double>(source.columns)));
-    };
-    const auto first_row = [&](std::int64_t j) {
-        const double row = (source.y0 - l.y_m(static_cast<double>(j))) / source.dy;
-        return static_cast<std::int64_t>(std::clamp(std::ceil(row - 1e-6), 0.0, static_cast<double>(source.rows)));
-    };
+    const auto column_at = [&](std::int64_t i) { return (l.x_m(static_cast<double>(i)) - source.x0) / source.dx; };
+    const auto row_at = [&](std::int64_t j) { return (source.y0 - l.y_m(static_cast<double>(j))) / source.dy; };
     for (const DrawItem& item : frame.draws) {
         drawn.set(item, frame.arena.vertices(item.height_slot));
         const LatticePoint corner = l.corner(item.tile);
         const std::int64_t extent = l.tile_extent(item.tile.level);
         const auto last = static_cast<double>(extent);
-        const std::int64_t east = std::min(corner.i + extent, l.cells_x + 1),
-                           south = std::min(corner.j + extent, l.cells_y + 1);
-        for (std::int64_t row = first_row(corner.j); row < first_row(south); ++row)
-            for (std::int64_t column = first_column(corner.i); column < first_column(east); ++column) {
+        const Range columns(column_at(corner.i), column_at(std::min(corner.i + extent, l.cells_x)), source.columns);
+        const Range rows(row_at(corner.j), row_at(std::min(corner.j + extent, l.cells_y)), source.rows);
+        for (std::int64_t row = rows.first; row < rows.end; ++row)
+            for (std::int64_t column = columns.first; column < columns.end; ++column) {
                 const double height_m = source.at(column, row);
                 if (std::isnan(height_m) || !is_drawn(source, column, row)) continue;
                 const glm::dvec3 truth{source.x0 + static_cast<double>(column) * source.dx,
                                        source.y0 - static_cast<double>(row) * source.dy, height_m};
-                const double u = std::clamp(l.i_of(truth.x) - static_cast<double>(corner.i), 0.0, last);
-                const double v = std::clamp(l.j_of(truth.y) - static_cast<double>(corner.j), 0.0, last);
+                const double i = l.i_of(truth.x), j = l.j_of(truth.y);
+                // Only a tile's last lines may be another's.
+                if ((row + 1 == rows.end || column + 1 == columns.end) &&
+                    !tiles.owns(item.tile, i, j, slack_i, slack_j))
+                    continue;
+                const double u = std::clamp(i - static_cast<double>(corner.i), 0.0, last);
+                const double v = std::clamp(j - static_cast<double>(corner.j), 0.0, last);
                 const auto px = judge.error_px(truth, drawn, u, v);
                 if (!px) continue;
                 errors.add(*px);

@@ -26,7 +26,7 @@ double milliseconds_since(Clock::time_point start) {
 }
 
 /// Drawn before the flight, so that what OpenGL takes once for many triangles is not charged to the tiles.
-constexpr std::int64_t kWarmUpTriangles = 600'000;
+constexpr std::int64_t kWarmUpTriangles = 2'000'000;
 /// Longest that the first picture is waited for.
 constexpr double kCatchUp_s = 0.08;
 /// The coarse picture of a cold start.
@@ -90,7 +90,7 @@ public:
         : scene_(scene), display_(display), ground_(ground), options_(o), fly_(f), context_at_(context_at) {}
 
     Result<FlightLog> fly(const FlightPath& path) {
-        if (auto ok = warm_up(path); !ok) return ok.error();
+        if (auto ok = warm_up(); !ok) return ok.error();
         FrameGovernor governor({fly_.fps > 0 ? 1000 / fly_.fps : 1e9, options_.tau_px, fly_.tau_most_px});
         start_ = Clock::now();
         for (std::size_t k = 0; k < path.size(); ++k) {
@@ -108,8 +108,10 @@ public:
     }
 
 private:
-    Result<void> warm_up(const FlightPath& path) {
-        auto camera = camera_of(path[0], options_);
+    Result<void> warm_up() {
+        // Over the whole terrain: triangles out of the picture cost next to nothing.
+        const double aspect = static_cast<double>(options_.width_px) / options_.height_px;
+        auto camera = camera_of(overview(scene_.dataset(), options_.fov_deg, aspect), options_);
         if (!camera) return camera.error();
         const auto& roots = scene_.pager().residency().heights.roots;
         DrawItem root;

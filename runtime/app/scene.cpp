@@ -4,16 +4,33 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <limits>
+#include <thread>
 
 #include "common/process_usage.h"
 #include "common/report.h"
+#include "runtime/view/frustum.h"
 
 namespace scree {
 namespace {
 
 constexpr std::uint64_t kForesightFrames = 4;
+constexpr auto kLook = std::chrono::microseconds(500);  // between looks for arrivals
+
+// All that a tile may fill, as the eye sees it, whether it is in memory or not.
+Box box_of(const Dataset& d, TileId id, glm::dvec3 eye, double half_curvature) {
+    const Lattice& l = d.lattice;
+    const LatticePoint corner = l.corner(id);
+    const auto west = static_cast<double>(corner.i), north = static_cast<double>(corner.j),
+               extent = static_cast<double>(l.tile_extent(id.level));
+    Box box{{l.x_m(west), l.y_m(north + extent), d.min_height_m}, {l.x_m(west + extent), l.y_m(north), d.max_height_m}};
+    const double x = std::max(std::abs(box.low.x - eye.x), std::abs(box.high.x - eye.x)),
+                 y = std::max(std::abs(box.low.y - eye.y), std::abs(box.high.y - eye.y));
+    box.low.z -= (x * x + y * y) * half_curvature;
+    return box;
+}
 
 }  // namespace
 
@@ -45,16 +62,51 @@ SelectionSettings Scene::selection_settings(double half_curvature, double growth
             growth_s};
 }
 
-// What the eye will want if it goes on as it does. Every few frames: the answer hardly changes, and what is asked for
-// comes after all that is wanted now.
-void Scene::look_ahead(std::span<const Camera> views, const SelectionSettings& settings) {
-    if (!(options_.foresight_s > 0) || views.empty()) return;
+// What the eye will want if it goes on as it does. Chosen every few frames, because the answer hardly changes; asked
+// for in all of them, because what is not is forgotten. True when it was chosen now.
+bool Scene::look_ahead(std::span<const Camera> views, SelectionSettings settings) {
     foresight_.see(views[0], pager_->residency().now_s);
-    if (frame_ % kForesightFrames != 0) return;
-    const Camera camera = foresight_.ahead(views[0], options_.foresight_s);
-    foreseen_ = &ahead_.select({&camera, 1}, settings, pager_->residency());
+    if (frame_ % kForesightFrames != 0) return false;
+    foreseen_ = nullptr;
+    const Camera wide = foresight_.ahead(views[0], options_.foresight_s);
+    Camera ahead = wide;
+    ahead.fov_deg = views[0].fov_deg;
+    // The wider view has the same pixels for more of the world; wanted is what will be wanted of the present view.
+    const double zoom = wide.focal_px() / ahead.focal_px();
+    settings.tau_px *= zoom * wide.off_axis_factor() / ahead.off_axis_factor();
+    settings.texture_tau_px *= zoom;
+    const Selection& future = ahead_.select({&wide, 1}, settings, pager_->residency());
     // A future that does not fit is no help to the present.
-    if (foreseen_->budget_limited) foreseen_ = nullptr;
+    if (future.budget_limited) return false;
+    foreseen_ = &future;
+    const Frustum view(ahead);
+    foreseen_requests_.assign(future.requests.begin(), future.requests.end());
+    for (TileRequest& request : foreseen_requests_) {
+        request.prefetch = true;
+        // What only a turn of the head would show is wanted after all else. Nothing of it is there yet, so by its error
+        // it would always come first.
+        if (!view.may_see(box_of(dataset(), request.id, ahead.eye, settings.half_curvature)))
+            request.priority /= 1 + request.priority;
+    }
+    std::stable_sort(foreseen_requests_.begin(), foreseen_requests_.end(),
+                     [](const TileRequest& a, const TileRequest& b) { return a.priority > b.priority; });
+    return true;
+}
+
+// The wishes of this frame with those of the last look ahead behind them. Its slots are those of `fresh` tables alone.
+Pager::Wishes Scene::with_foreseen(const Pager::Wishes& now, bool fresh) {
+    Pager::Wishes wishes = now;
+    requests_.assign(now.requests.begin(), now.requests.end());
+    requests_.insert(requests_.end(), foreseen_requests_.begin(), foreseen_requests_.end());
+    wishes.requests = requests_;
+    if (!fresh) return wishes;
+    standing_heights_.assign(foreseen_->planned_heights.begin(), foreseen_->planned_heights.end());
+    standing_heights_.insert(standing_heights_.end(), now.standing_heights.begin(), now.standing_heights.end());
+    standing_textures_.assign(foreseen_->planned_textures.begin(), foreseen_->planned_textures.end());
+    standing_textures_.insert(standing_textures_.end(), now.standing_textures.begin(), now.standing_textures.end());
+    wishes.standing_heights = standing_heights_;
+    wishes.standing_textures = standing_textures_;
+    return wishes;
 }
 
 SceneFrame Scene::think(std::span<const Camera> views, double growth_s) {
@@ -65,26 +117,15 @@ SceneFrame Scene::think(std::span<const Camera> views, double growth_s) {
     SelectionSettings settings = selection_settings(frame.half_curvature, growth_s);
     const Selection& now = selector_.select(views, settings, pager_->residency());
     settings.growth_s = 0;
-    foreseen_ = nullptr;
-    if (growth_s > 0 && !now.budget_limited) look_ahead(views, settings);
+    bool fresh = false;
+    if (growth_s > 0 && options_.foresight_s > 0 && !views.empty() && !now.budget_limited)
+        fresh = look_ahead(views, settings);
+    else
+        foreseen_ = nullptr;
     ++frame_;
-    Pager::Wishes wishes{now.planned_heights, now.planned_textures, now.standing_heights, now.standing_textures,
-                         now.requests};
-    if (foreseen_ != nullptr) {
-        standing_heights_.assign(foreseen_->planned_heights.begin(), foreseen_->planned_heights.end());
-        standing_heights_.insert(standing_heights_.end(), now.standing_heights.begin(), now.standing_heights.end());
-        standing_textures_.assign(foreseen_->planned_textures.begin(), foreseen_->planned_textures.end());
-        standing_textures_.insert(standing_textures_.end(), now.standing_textures.begin(), now.standing_textures.end());
-        requests_.assign(now.requests.begin(), now.requests.end());
-        for (TileRequest request : foreseen_->requests) {
-            request.prefetch = true;
-            requests_.push_back(request);
-        }
-        wishes.standing_heights = standing_heights_;
-        wishes.standing_textures = standing_textures_;
-        wishes.requests = requests_;
-    }
-    pager_->request(wishes);
+    const Pager::Wishes wishes{now.planned_heights, now.planned_textures, now.standing_heights, now.standing_textures,
+                               now.requests};
+    pager_->request(foreseen_ != nullptr ? with_foreseen(wishes, fresh) : wishes);
     frame.selection = &now;
     frame.select_ms = 1e3 * (thread_cpu_seconds() - start_s);
     frame.stand_ins = !now.complete;
@@ -101,14 +142,18 @@ SceneFrame Scene::advance(std::span<const Camera> views, double now_s) {
 
 SceneFrame Scene::catch_up(std::span<const Camera> views, double now_s, double seconds) {
     // What comes before the first picture has nothing to grow out of: it came before time began.
-    pager_->advance_clock(now_s - options_.growth_s);
+    pager_->advance_clock(now_s - 2 * options_.growth_s);
     const auto start = std::chrono::steady_clock::now();
     std::int64_t uploads = 0;
-    for (;;) {
-        think(views, 0);
-        const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - start;
-        if (pager_->idle() || passed.count() > seconds) break;
-        uploads += pager_->take_arrivals(options_.upload_bytes_per_frame, true);
+    think(views, 0);
+    while (!pager_->idle() && std::chrono::steady_clock::now() - start < std::chrono::duration<double>(seconds)) {
+        const int taken = pager_->take_arrivals(options_.upload_bytes_per_frame, false);
+        uploads += taken;
+        // To wait for an arrival would be to wait as long as a slow disk likes.
+        if (taken == 0)
+            std::this_thread::sleep_for(kLook);
+        else
+            think(views, 0);
     }
     SceneFrame frame = advance(views, now_s);
     frame.uploads += uploads;

@@ -63,7 +63,8 @@ private:
     Scene(const SqliteStore& store, const SceneOptions& options, const MemoryPlan& memory);
     SceneFrame think(std::span<const Camera> views, double growth_s);
     SelectionSettings selection_settings(double half_curvature, double growth_s) const;
-    void look_ahead(std::span<const Camera> views, const SelectionSettings& settings);
+    bool look_ahead(std::span<const Camera> views, SelectionSettings settings);
+    Pager::Wishes with_foreseen(const Pager::Wishes& now, bool fresh);
 
     const SqliteStore& store_;
     SceneOptions options_;
@@ -74,7 +75,7 @@ private:
     Foresight foresight_;
     const Selection* foreseen_ = nullptr;  ///< of the last look ahead; null: none
     std::vector<std::int32_t> standing_heights_, standing_textures_;
-    std::vector<TileRequest> requests_;
+    std::vector<TileRequest> requests_, foreseen_requests_;
     std::uint64_t frame_ = 0;
 };
 

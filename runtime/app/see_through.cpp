@@ -20,6 +20,7 @@ public:
                      depth = static_cast<double>(l.cells_y) * l.spacing_m;
         const glm::dvec2 middle{l.x_m(0) + width / 2, l.y_m(0) - depth / 2};
         reach_m_ = glm::length(middle - glm::dvec2(camera.eye)) + std::hypot(width, depth);
+        below_m_ = std::max(0.0, camera.eye.z - ground.dataset().min_height_m);
     }
 
     // Does the ray through a point of the picture, in pixels from its top left corner, meet the ground?
@@ -28,7 +29,7 @@ public:
         const double up = (1 - 2 * y_px / camera_.height_px) * camera_.tan_half_y();
         const glm::dvec3 direction = glm::normalize(camera_.forward + across * camera_.right() + up * camera_.up);
         const double level = glm::length(glm::dvec2(direction));
-        if (half_curvature_ <= 0 || level < 1e-6) return hits(camera_.eye, direction, 2 * reach_m_ + camera_.eye.z);
+        if (half_curvature_ <= 0 || level < 1e-6) return hits(camera_.eye, direction, 2 * reach_m_ + below_m_);
         // On a flat earth the same ray rises by d^2 / 2R.
         const auto at = [&](double t) {
             const double d = t * level;
@@ -52,7 +53,8 @@ private:
     Ground& ground_;
     const Camera& camera_;
     double half_curvature_;
-    double reach_m_ = 0;
+    double reach_m_ = 0;  ///< furthest that terrain is from the eye, in plan
+    double below_m_ = 0;  ///< and in height, below it
 };
 
 }  // namespace

@@ -148,8 +148,8 @@ Result<void> view(ViewOptions o, const WindowSettings& w) {
         const double frame_s = std::chrono::duration<double>(Clock::now() - now).count();
         mean_frame_s = mean_frame_s > 0 ? 0.9 * mean_frame_s + 0.1 * frame_s : frame_s;
         if (w.fps > 0) {
-            const double before_px = governor.tau_px();
-            redraw = redraw || governor.next(1000 * frame_s) != before_px;
+            const double before_px = governor.tau_px(), next_px = governor.next(1000 * frame_s);
+            redraw = redraw || next_px != before_px;
         }
         if (show_hud) hud.draw(status_lines(**scene, frame, pose, 1 / mean_frame_s, controls.speed_m_per_s()));
         (*display)->context().swap_buffers();

@@ -14,23 +14,34 @@ constexpr double kLeap_s = 20;
 constexpr double kWidening = 1.3;
 constexpr double kMostTurn = 1.2;  ///< radians
 
+// Axis times radians.
+glm::dvec3 turn_between(glm::dvec3 from, glm::dvec3 to) {
+    const glm::dvec3 axis = glm::cross(from, to);
+    const double sine = glm::length(axis);
+    return sine > 0 ? axis * (std::atan2(sine, glm::dot(from, to)) / sine) : axis;
+}
+
 }  // namespace
 
 void Foresight::see(const Camera& camera, double now_s) {
     const double passed_s = now_s - when_s_;
     const glm::dvec3 moved = camera.eye - eye_;
-    const bool leapt = glm::length(velocity_) > 0 && glm::length(moved) > kLeap_s * glm::length(velocity_);
-    if (!seen_ || !(passed_s > 0) || leapt) {
+    glm::dvec3 measured(0);
+    if (seen_ && passed_s > 0) measured = moved / passed_s;
+    // From rest the first move may be a leap or a start: the next one tells.
+    const double speed = std::max(glm::length(velocity_), glm::length(measured_));
+    if (!seen_ || !(passed_s > 0) || glm::length(moved) > kLeap_s * speed) {
         velocity_ = turn_ = glm::dvec3(0);
     } else {
         const double share = 1 - std::exp(-passed_s / kSmoothing_s);
-        velocity_ += share * (moved / passed_s - velocity_);
-        turn_ += share * (glm::cross(forward_, camera.forward) / passed_s - turn_);
+        velocity_ += share * (measured - velocity_);
+        turn_ += share * (turn_between(forward_, camera.forward) / passed_s - turn_);
     }
     seen_ = true;
     when_s_ = now_s;
     eye_ = camera.eye;
     forward_ = camera.forward;
+    measured_ = measured;
 }
 
 Camera Foresight::ahead(const Camera& camera, double seconds) const {

@@ -22,6 +22,7 @@ private:
     double when_s_ = 0;
     glm::dvec3 eye_{0}, forward_{0, 1, 0};
     glm::dvec3 velocity_{0}, turn_{0};
+    glm::dvec3 measured_{0};  ///< velocity of the last step alone
 };
 
 }  // namespace scree

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <limits>
+
 #include "common/query/ground.h"
 #include "runtime/view/frustum.h"
 #include "tests/runtime/lod/memory_store.h"
@@ -94,6 +97,60 @@ TEST(Resample, IsEvenInIndexAndKeepsBothEnds) {
     for (const int frames : {7, 100, 1001}) EXPECT_EQ(resample(path, frames).back().eye, path.back().eye);
 }
 
+// Of a point on a path of straight runs: metres from its start, measured along it; negative where it is not on it.
+double along(const FlightPath& path, glm::dvec3 eye) {
+    double before = 0;
+    for (std::size_t k = 1; k < path.size(); ++k) {
+        const double run = glm::length(path[k].eye - path[k - 1].eye), at = glm::length(eye - path[k - 1].eye);
+        if (run > 0 && std::abs(at + glm::length(path[k].eye - eye) - run) < 1e-9 * run) return before + at;
+        before += run;
+    }
+    return -1;
+}
+
+const FlightPath kBent{
+    {{0, 0, 0}, {5, 5, 5}}, {{30, 0, 0}, {6, 5, 5}}, {{30, 40, 0}, {6, 9, 5}}, {{30, 40, 10}, {6, 9, 7}}};
+
+TEST(Paced, StepsAreEqualAlongThePathThereAndBackAgain) {
+    constexpr double kLength = 80;
+    for (const double step : {0.5, 7.0, 33.0, 79.0, 80.0, 81.0, 500.0}) {
+        const FlightPath path = paced(kBent, step, 400);
+        ASSERT_EQ(path.size(), 400u);
+        for (std::size_t k = 0; k < path.size(); ++k) {
+            double lap = std::fmod(static_cast<double>(k) * step, 2 * kLength);
+            if (lap > kLength) lap = 2 * kLength - lap;
+            ASSERT_NEAR(along(kBent, path[k].eye), lap, 1e-9) << step << " m, pose " << k;
+        }
+    }
+}
+
+TEST(Paced, TheLookGoesWithTheEye) {
+    const FlightPath path = paced(kBent, 15, 5);
+    EXPECT_EQ(path[1].look, glm::dvec3(5.5, 5, 5));
+    EXPECT_EQ(path[2].look, glm::dvec3(6, 5, 5));
+    EXPECT_NEAR(path[4].look.y, 8, 1e-12);
+}
+
+TEST(Paced, PosesThatStandStillAreStridden) {
+    const FlightPath still{
+        {{0, 0, 0}, {1, 0, 0}}, {{0, 0, 0}, {2, 0, 0}}, {{10, 0, 0}, {3, 0, 0}}, {{10, 0, 0}, {4, 0, 0}}};
+    const FlightPath path = paced(still, 2.5, 12);
+    for (std::size_t k = 0; k < path.size(); ++k) {
+        const double lap = std::fmod(2.5 * static_cast<double>(k), 20);
+        ASSERT_NEAR(path[k].eye.x, lap <= 10 ? lap : 20 - lap, 1e-12) << k;
+        ASSERT_TRUE(std::isfinite(path[k].look.x));
+    }
+}
+
+TEST(Paced, WithoutLengthOrStepIsEvenInIndex) {
+    const FlightPath turning{{{1, 2, 3}, {1, 0, 0}}, {{1, 2, 3}, {2, 0, 0}}};
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    for (const double step : {0.0, -1.0, nan}) EXPECT_EQ(paced(kBent, step, 7)[3].eye, resample(kBent, 7)[3].eye);
+    EXPECT_EQ(paced(turning, 5, 3)[1].look.x, 1.5);
+    EXPECT_EQ(paced({kBent[0]}, 5, 4).size(), 4u);
+    EXPECT_TRUE(paced({}, 5, 4).empty());
+}
+
 constexpr int kKeyPoses = 301;  // as many as the flight is made of: others are interpolated between them
 
 TEST(DefaultFlight, IsTheSameEveryTimeAboveGroundAndLowThenHighThenSteep) {
@@ -130,10 +187,27 @@ TEST(DefaultFlight, HasAsManyPosesAsAskedFor) {
     test::Random random(test::seed());
     const auto terrain = test::random_terrain(random);
     const test::MemoryStore store(terrain);
-    for (const int frames : {0, 1, 2, 3, 301}) {
+    for (const int frames : {1, 2, 3, 301}) {
         const auto path = default_flight(store, frames);
         ASSERT_TRUE(path.ok());
         EXPECT_EQ(path->size(), static_cast<std::size_t>(frames));
+    }
+}
+
+TEST(DefaultFlight, IsItsKeyPosesWhenNoNumberIsAskedFor) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    const auto terrain = test::random_terrain(random);
+    const test::MemoryStore store(terrain);
+    for (const int frames : {0, -1}) {
+        const auto path = default_flight(store, frames), keys = default_flight(store, kKeyPoses);
+        ASSERT_TRUE(path.ok());
+        ASSERT_TRUE(keys.ok());
+        ASSERT_EQ(path->size(), std::size_t{kKeyPoses});
+        for (std::size_t k = 0; k < kKeyPoses; ++k) {
+            ASSERT_EQ((*path)[k].eye, (*keys)[k].eye) << k;
+            ASSERT_EQ((*path)[k].look, (*keys)[k].look) << k;
+        }
     }
 }
 
@@ -145,6 +219,69 @@ TEST(DefaultFlight, HandsOnTheErrorOfADamagedStore) {
     const auto path = default_flight(store, 10);
     ASSERT_FALSE(path.ok());
     EXPECT_EQ(path.error().code, ErrorCode::store);
+}
+
+TEST(RoamingFlight, IsTheSameForTheSameSeedAndAnotherForAnother) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    const auto terrain = test::random_terrain(random);
+    const test::MemoryStore store(terrain);
+    const auto path = roaming_flight(store, 500, 7), again = roaming_flight(store, 500, 7),
+               longer = roaming_flight(store, 800, 7), other = roaming_flight(store, 500, 8);
+    ASSERT_TRUE(path.ok() && again.ok() && longer.ok() && other.ok());
+    ASSERT_EQ(path->size(), 500u);
+    int apart = 0;
+    for (std::size_t k = 0; k < 500; ++k) {
+        ASSERT_EQ((*path)[k].eye, (*again)[k].eye);
+        ASSERT_EQ((*path)[k].look, (*again)[k].look);
+        ASSERT_EQ((*path)[k].eye, (*longer)[k].eye);
+        apart += (*path)[k].eye != (*other)[k].eye ? 1 : 0;
+    }
+    EXPECT_EQ(apart, 500);
+}
+
+TEST(RoamingFlight, StaysAboveGroundAndLeapsTurnsAndGoesStraight) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    for (int world = 0; world < 6; ++world) {
+        const auto terrain = test::random_terrain(random);
+        const test::MemoryStore store(terrain);
+        const auto path = roaming_flight(store, 3000, random());
+        ASSERT_TRUE(path.ok());
+        auto ground = Ground::open(store);
+        ASSERT_TRUE(ground.ok());
+        const Lattice& l = terrain.lattice();
+        const double extent = l.spacing_m * static_cast<double>(std::max(l.cells_x, l.cells_y));
+        int leaps = 0, turns = 0, straight = 0;
+        for (std::size_t k = 0; k < path->size(); ++k) {
+            const FlightPose& pose = (*path)[k];
+            ASSERT_TRUE(look_at(pose.eye, pose.look, 40, 800, 800).ok()) << k;
+            const auto height = (*ground)->height(pose.eye.x, pose.eye.y);
+            ASSERT_TRUE(height.ok());
+            ASSERT_GE(pose.eye.z,
+                      (*height ? (*height)->height_m : terrain.dataset().min_height_m) + 1.99 * l.spacing_m);
+            if (k == 0) continue;
+            const FlightPose& before = (*path)[k - 1];
+            const glm::dvec2 moved(pose.eye - before.eye), was(before.look - before.eye), is(pose.look - pose.eye);
+            const double turn = std::abs(was.x * is.y - was.y * is.x) / (glm::length(was) * glm::length(is));
+            // A run's speed is at most a fiftieth of the extent.
+            if (glm::length(moved) > 0.1 * extent)
+                ++leaps;
+            else
+                ++(turn > 1e-9 ? turns : straight);
+        }
+        EXPECT_GE(leaps, 5);
+        EXPECT_GE(turns, 100);
+        EXPECT_GE(straight, 1000);
+    }
+}
+
+TEST(RoamingFlight, HandsOnTheErrorOfADamagedStore) {
+    test::Random random(test::seed());
+    const auto terrain = test::random_terrain(random);
+    test::MemoryStore store(terrain);
+    for (const TileId id : terrain.tiles()) store.damage(TileKind::height, id, test::Damage::checksum);
+    EXPECT_FALSE(roaming_flight(store, 100, 1).ok());
 }
 
 TEST(Overview, ShowsTheWholeTerrainAndFillsThePicture) {

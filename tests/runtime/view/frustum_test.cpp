@@ -105,6 +105,84 @@ TEST(Frustum, HoldsThePointsThatProjectIntoThePicture) {
     EXPECT_GT(inside, 1000);
 }
 
+// The frustum is convex: a box lies in it as a whole exactly when its corners do, and none of it is in view when one
+// plane has all corners behind it.
+struct ByCorners {
+    bool all = true, none = false;
+    double closest = 1e300;  ///< of a corner to a plane, relative to its distance from the eye
+    ByCorners(const Camera& camera, const Box& box) {
+        const double tx = camera.tan_half_x(), ty = camera.tan_half_y();
+        const auto judge = [&](auto&& depth) {
+            int behind = 0;
+            for (int corner = 0; corner < 8; ++corner) {
+                const glm::dvec3 p =
+                    glm::dvec3(corner & 1 ? box.high.x : box.low.x, corner & 2 ? box.high.y : box.low.y,
+                               corner & 4 ? box.high.z : box.low.z) -
+                    camera.eye;
+                const double d = depth(p);
+                closest = std::min(closest, std::abs(d) / (1e-300 + glm::length(p)));
+                behind += d < 0 ? 1 : 0;
+            }
+            all = all && behind == 0;
+            none = none || behind == 8;
+        };
+        const glm::dvec3 right = camera.right(), up = camera.up, forward = camera.forward;
+        judge([&](glm::dvec3 p) { return glm::dot(p, forward) - camera.near_m; });
+        judge([&](glm::dvec3 p) { return glm::dot(p, forward) * tx - glm::dot(p, right); });
+        judge([&](glm::dvec3 p) { return glm::dot(p, forward) * tx + glm::dot(p, right); });
+        judge([&](glm::dvec3 p) { return glm::dot(p, forward) * ty - glm::dot(p, up); });
+        judge([&](glm::dvec3 p) { return glm::dot(p, forward) * ty + glm::dot(p, up); });
+    }
+};
+
+TEST(Frustum, SightTellsAllSomeAndNoneAsTheCornersDo) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    int all = 0, some = 0, none = 0;
+    for (int k = 0; k < 200000; ++k) {
+        const Camera camera = random_camera(random);
+        const double z = std::exp(any(random, -3, 12)), size = z * std::exp(any(random, -6, 2));
+        const glm::dvec3 p =
+            camera.eye + z * (camera.forward + 1.5 * any(random) * camera.tan_half_x() * camera.right() +
+                              1.5 * any(random) * camera.tan_half_y() * camera.up);
+        const glm::dvec3 half = size * glm::dvec3(any(random, 0, 1), any(random, 0, 1), any(random, 0, 1));
+        const Box box{p - half, p + half};
+        const ByCorners truth(camera, box);
+        if (truth.closest < 1e-7) continue;
+        const Frustum frustum(camera);
+        const Sight sight = frustum.sight(box);
+        ASSERT_EQ(sight == Sight::none, truth.none);
+        ASSERT_EQ(sight == Sight::all, truth.all);
+        ASSERT_EQ(sight != Sight::none, frustum.may_see(box));
+        all += sight == Sight::all ? 1 : 0;
+        some += sight == Sight::some ? 1 : 0;
+        none += sight == Sight::none ? 1 : 0;
+    }
+    EXPECT_GT(all, 10000);
+    EXPECT_GT(some, 10000);
+    EXPECT_GT(none, 10000);
+}
+
+// What is called all is not looked into again: then it must be so for every point of the box.
+TEST(Frustum, SightOfAllHoldsForEveryPointAndOfNoneForNone) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    for (int k = 0; k < 30000; ++k) {
+        const Camera camera = random_camera(random);
+        const double z = std::exp(any(random, 0, 12));
+        const glm::dvec3 p =
+            camera.eye + z * (camera.forward + 1.2 * any(random) * camera.tan_half_x() * camera.right());
+        const glm::dvec3 half = 0.2 * z * glm::dvec3(any(random, 0, 1), any(random, 0, 1), any(random, 0, 1));
+        const Frustum frustum(camera);
+        const Sight sight = frustum.sight({p - half, p + half});
+        if (sight == Sight::some) continue;
+        for (int n = 0; n < 8; ++n) {
+            const glm::dvec3 q = p + 0.999999 * half * glm::dvec3(any(random), any(random), any(random));
+            ASSERT_EQ(frustum.contains(q), sight == Sight::all);
+        }
+    }
+}
+
 TEST(DistanceToBox, IsZeroInsideAndTheNearestPointsOutside) {
     const Box box{{0, 0, 0}, {10, 20, 30}};
     EXPECT_EQ(distance_to_box({5, 5, 5}, box), 0);

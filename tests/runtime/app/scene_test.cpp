@@ -1,0 +1,207 @@
+#include "runtime/app/scene.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <thread>
+
+#include "common/store/height_codec.h"
+#include "common/store/texture_codec.h"
+#include "runtime/app/cpu_arena.h"
+#include "tests/runtime/lod/synthetic_terrain.h"
+
+namespace scree {
+namespace {
+
+using test::SyntheticTerrain;
+
+// Ten kilometres across: what one eye wants is a small part of it.
+SyntheticTerrain hills() {
+    test::TerrainShape shape;
+    shape.tile_cells_log2 = 4;
+    shape.cells_x = shape.cells_y = 1024;
+    shape.texture_depth = 4;
+    return SyntheticTerrain(shape, test::rough_heights(3, 900));
+}
+
+/// A SyntheticTerrain in a file.
+class StoredTerrain {
+public:
+    explicit StoredTerrain(SyntheticTerrain terrain) : terrain_(std::move(terrain)) {
+        const Dataset& d = terrain_.dataset();
+        auto writer = SqliteStoreWriter::create(path());
+        EXPECT_TRUE(writer.ok());
+        for (const TileId id : terrain_.tiles())
+            put(**writer, TileKind::height, id,
+                encode_height_tile(*terrain_.tile(id), d.lattice.tile_cells_log2, HeightCodec::raw));
+        for (const TileId id : terrain_.textures())
+            put(**writer, TileKind::texture, id,
+                encode_texture_tile(terrain_.texture(id), d.texture_size_log2, TextureCodec::raw));
+        EXPECT_TRUE((*writer)->finish(d).ok());
+        auto store = SqliteStore::open(path());
+        EXPECT_TRUE(store.ok()) << store.error().message;
+        store_ = std::move(*store);
+    }
+    const SqliteStore& store() const { return *store_; }
+    const SyntheticTerrain& terrain() const { return terrain_; }
+    /// Level, at a place in finest cells.
+    Camera camera(double i, double j, double above_m = 40) const {
+        const Lattice& l = terrain_.lattice();
+        const glm::dvec3 eye{l.x_m(i), l.y_m(j), terrain_.dataset().max_height_m + above_m};
+        auto camera = look_at(eye, eye + glm::dvec3(1, 0.2, -0.3), 40, 400, 300);
+        EXPECT_TRUE(camera.ok());
+        return *camera;
+    }
+
+private:
+    std::string path() const { return folder_.file("t.scree"); }
+    void put(SqliteStoreWriter& writer, TileKind kind, TileId id, const std::vector<std::uint8_t>& payload) const {
+        EXPECT_TRUE(writer.put(kind, *tile_key(terrain_.lattice(), id), 0, payload).ok());
+    }
+
+    test::TemporaryFolder folder_;
+    SyntheticTerrain terrain_;
+    std::unique_ptr<SqliteStore> store_;
+};
+
+/// A scene whose tiles go to ordinary memory.
+struct Staged {
+    Staged(const StoredTerrain& stored, const SceneOptions& options) {
+        auto opened = Scene::open(stored.store(), options);
+        EXPECT_TRUE(opened.ok()) << opened.error().message;
+        scene = std::move(*opened);
+        arena = std::make_unique<CpuArena>(stored.store().dataset(), scene->memory().height_slots);
+        EXPECT_TRUE(scene->start(*arena).ok());
+    }
+    // In this order: the scene's threads end before what they fill.
+    std::unique_ptr<CpuArena> arena;
+    std::unique_ptr<Scene> scene;
+};
+
+SceneOptions small_options() {
+    SceneOptions options;
+    options.budget_bytes = std::int64_t{64} << 20;
+    options.tau_px = 2;
+    return options;
+}
+
+class SceneOfHills : public testing::Test {
+protected:
+    static void SetUpTestSuite() { stored_ = std::make_unique<StoredTerrain>(hills()); }
+    static void TearDownTestSuite() { stored_.reset(); }
+    static std::unique_ptr<StoredTerrain> stored_;
+};
+std::unique_ptr<StoredTerrain> SceneOfHills::stored_;
+
+TEST_F(SceneOfHills, CompleteEndsWithNothingMissingAndNothingGrowing) {
+    Staged staged(*stored_, small_options());
+    const Camera camera = stored_->camera(200, 512);
+    const auto frame = staged.scene->complete({&camera, 1});
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+    EXPECT_FALSE(frame->stand_ins);
+    EXPECT_TRUE(frame->selection->complete);
+    EXPECT_FALSE(frame->selection->growing);
+    EXPECT_TRUE(frame->selection->requests.empty());
+    EXPECT_LE(frame->selection->max_bound_px, staged.scene->options().tau_px);
+    EXPECT_GT(frame->uploads, 10);
+    EXPECT_GE(frame->select_ms, 0);
+    // Again at the same place there is nothing to do.
+    const auto again = staged.scene->complete({&camera, 1});
+    ASSERT_TRUE(again.ok());
+    EXPECT_EQ(again->uploads, 0);
+    EXPECT_EQ(again->selection->triangles, frame->selection->triangles);
+}
+
+TEST_F(SceneOfHills, CompleteStopsWhenAsked) {
+    Staged staged(*stored_, small_options());
+    const Camera camera = stored_->camera(200, 512);
+    const auto frame = staged.scene->complete({&camera, 1}, [] { return true; });
+    ASSERT_FALSE(frame.ok());
+    EXPECT_EQ(frame.error().code, ErrorCode::interrupted);
+}
+
+TEST_F(SceneOfHills, WhatCatchingUpFetchedStandsAtOnceAndWhatComesLaterGrows) {
+    for (const double now_s : {0.0, 0.1, 0.7, 1e3 / 3, 1e6 / 7}) {
+        Staged staged(*stored_, small_options());
+        const Camera camera = stored_->camera(200, 512), elsewhere = stored_->camera(900, 800);
+        SceneFrame frame = staged.scene->catch_up({&camera, 1}, now_s, 1000);
+        EXPECT_FALSE(frame.stand_ins);
+        EXPECT_GT(frame.uploads, 10);
+        EXPECT_FALSE(frame.selection->growing) << now_s;
+        EXPECT_LE(frame.selection->max_bound_px, 2);
+        EXPECT_FALSE(staged.scene->advance({&camera, 1}, now_s).selection->growing);
+        bool grew = false;
+        for (double later_s = now_s; !staged.scene->pager().idle() || later_s == now_s; later_s += 0.01) {
+            frame = staged.scene->advance({&elsewhere, 1}, later_s);
+            grew = grew || frame.selection->growing;
+            std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        }
+        EXPECT_TRUE(grew);
+    }
+}
+
+TEST_F(SceneOfHills, CatchingUpDoesNotWaitForASlowDisk) {
+    SceneOptions options = small_options();
+    options.latency_ms = 1000;
+    const Camera camera = stored_->camera(200, 512);
+    Staged slow(*stored_, options);
+    const SceneFrame frame = slow.scene->catch_up({&camera, 1}, 0, 0.02);
+    EXPECT_EQ(frame.uploads, 0);
+    EXPECT_TRUE(frame.stand_ins);
+    EXPECT_FALSE(frame.selection->draws[0].empty());
+    EXPECT_FALSE(slow.scene->pager().idle());
+}
+
+TEST_F(SceneOfHills, AdvancingTakesNoMoreThanItsShareOfArrivals) {
+    SceneOptions options = small_options();
+    options.upload_bytes_per_frame = 1;
+    options.foresight_s = 0;
+    Staged staged(*stored_, options);
+    const Camera camera = stored_->camera(200, 512);
+    SceneFrame frame = staged.scene->advance({&camera, 1}, 0);
+    std::int64_t uploads = 0;
+    for (double now_s = 0; frame.stand_ins; now_s += 0.01) {
+        frame = staged.scene->advance({&camera, 1}, now_s);
+        ASSERT_LE(frame.uploads, 1);
+        ASSERT_GE(frame.select_ms, 0);
+        uploads += frame.uploads;
+        std::this_thread::sleep_for(std::chrono::microseconds(200));
+    }
+    EXPECT_GT(uploads, 10);
+}
+
+struct Flown {
+    int stand_ins = 0;
+    std::int64_t prefetched = 0;
+};
+
+// A straight flight at an even speed, with a store that gives at most one tile a frame: what counts is when it was
+// asked for.
+Flown fly_straight(const StoredTerrain& stored, double foresight_s) {
+    SceneOptions options = small_options();
+    options.foresight_s = foresight_s;
+    options.upload_bytes_per_frame = 1;
+    Staged staged(stored, options);
+    Camera camera = stored.camera(10, 512);
+    EXPECT_TRUE(staged.scene->complete({&camera, 1}).ok());
+    Flown flown;
+    for (int k = 0; k < 300; ++k) {
+        camera = stored.camera(10 + 0.15 * k, 512);
+        const SceneFrame frame = staged.scene->advance({&camera, 1}, k / 30.0);
+        flown.stand_ins += frame.stand_ins ? 1 : 0;
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    flown.prefetched = staged.scene->pager().counters().prefetched;
+    return flown;
+}
+
+TEST_F(SceneOfHills, ForesightLeavesFewerStandInsOnAStraightFlight) {
+    const Flown without = fly_straight(*stored_, 0), with = fly_straight(*stored_, 1);
+    EXPECT_EQ(without.prefetched, 0);
+    EXPECT_GT(with.prefetched, 20);
+    EXPECT_GT(without.stand_ins, 20);
+    EXPECT_LT(with.stand_ins, without.stand_ins / 2);
+}
+
+}  // namespace
+}  // namespace scree
