@@ -19,7 +19,7 @@ void expect_keys(const nlohmann::json& report, const std::vector<std::string>& k
 nlohmann::json build_store_from(const std::vector<std::string>& inputs, const std::string& store);
 /// info, verify, audit at each tau and fly at each budget: every promise of a whole store.
 nlohmann::json expect_sound_store(const std::string& store, const std::vector<double>& taus = {0.5, 1, 2, 8},
-                                  const std::vector<std::string>& budgets = {"2M", "8M"});
+                                  const std::vector<std::string>& budgets = {"4M", "8M"});
 std::string digest_of(const std::string& store);
 
 /// Nothing that a stopped or refused program leaves behind: no OUT.partial, OUT.heights, journals.
