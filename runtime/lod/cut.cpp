@@ -382,6 +382,10 @@ Level Cut::limit_beside(const CutNode& node) const {
     return node.level + level_of_share(std::clamp(kTextureApproach * node.doublings, 0.0, 1.0));
 }
 
+// A page that a plan would split once it is there holds nobody coarse meanwhile: what a plan holds only
+// grows with what is known.
+bool Cut::is_unknown(const CutNode& node) const { return !settings_.only_resident && node.slot == kNotResident; }
+
 // Has a split page nothing of its own on part of a side, because it is absent or out of view? There it goes on to speak
 // for itself.
 bool Cut::is_open(const CutNode& node, int side) {
@@ -454,6 +458,7 @@ bool Cut::lower(std::int32_t index, Level limit) {
     if (limit >= finest || nodes_[static_cast<std::size_t>(index)].split) return changed;
     const std::size_t first = nodes_.size();
     const bool growing = finest > level_of(minimum_exponent(node));
+    if (is_unknown(node)) return changed;
     if (growing || node.id.level == lattice_.deepest_level || !try_split(index)) {
         needs_floors_ = true;
         return changed;
@@ -486,7 +491,7 @@ void Cut::lower_descendants(std::int32_t index, Level limit) {
 // Where a page cannot be as fine as its neighbours want, or is still growing, the finer side stays coarse.
 void Cut::raise_to_floors() {
     for (std::size_t k = 0; k < nodes_.size(); ++k)
-        if (!nodes_[k].split) enqueue(static_cast<std::int32_t>(k));
+        if (!nodes_[k].split && !is_unknown(nodes_[k])) enqueue(static_cast<std::int32_t>(k));
     for (std::size_t head = 0; head < queue_.size(); ++head) {
         const std::int32_t index = queue_[head];
         CutNode& node = nodes_[static_cast<std::size_t>(index)];
