@@ -188,15 +188,17 @@ void Cut::add_roots() {
     }
 }
 
-// The node across one side, as large as this one or larger. Links are brought up to date as they are used: a child
-// starts with its parent's.
+// The node across one side, as large as this one or larger; a larger one that is split is the one that lacks the page
+// across. Links are brought up to date as they are used: a child starts with its parent's.
 std::int32_t Cut::neighbour(std::int32_t index, int direction) {
     CutNode& node = nodes_[static_cast<std::size_t>(index)];
     std::int32_t& link = node.neighbours[static_cast<std::size_t>(direction)];
     while (link >= 0) {
         const CutNode& other = nodes_[static_cast<std::size_t>(link)];
         if (!other.split || other.page_level >= node.page_level) break;
-        link = other.children[quadrant_towards(across(node.id, direction), other.page_level)];
+        const std::int32_t child = other.children[quadrant_towards(across(node.id, direction), other.page_level)];
+        if (child < 0) break;
+        link = child;
     }
     return link;
 }
@@ -215,8 +217,11 @@ void Cut::for_each_leaf_on(std::int32_t index, int side, const Visit& visit) con
 
 template <class Visit>
 void Cut::for_each_neighbour(std::int32_t leaf, int direction, const Visit& visit) {
-    if (const std::int32_t other = neighbour(leaf, direction); other >= 0)
-        for_each_leaf_on(other, opposite(direction), visit);
+    const std::int32_t other = neighbour(leaf, direction);
+    if (other < 0) return;
+    const CutNode& beside = nodes_[static_cast<std::size_t>(other)];
+    if (beside.split && beside.page_level < nodes_[static_cast<std::size_t>(leaf)].page_level) return;
+    for_each_leaf_on(other, opposite(direction), visit);
 }
 
 bool Cut::try_split(std::int32_t index) {
@@ -382,10 +387,30 @@ Level Cut::limit_beside(const CutNode& node) const {
     return node.level + level_of_share(std::clamp(kTextureApproach * node.doublings, 0.0, 1.0));
 }
 
+// How coarse an edge may be. The finest surface is only inexact where its edges move: they may move no further than its
+// tolerance allows.
+Level Cut::edge_limit(const CutNode& node) const {
+    const Level limit = node.level + kOneLevel;
+    const double allowed_m = settings_.tau_px * node.metres_per_px;
+    if (node.id.level < lattice_.deepest_level || !(allowed_m < node.finest_error_m)) return limit;
+    return std::min(limit, level_of_share(allowed_m / node.finest_error_m));
+}
+
+// A page that a plan would split once it is there holds nobody coarse meanwhile: what a plan holds only
+// grows with what is known.
+bool Cut::is_unknown(const CutNode& node) const { return !settings_.only_resident && node.slot == kNotResident; }
+
 // Has a split page nothing of its own on part of a side, because it is absent or out of view? There it goes on to speak
 // for itself.
 bool Cut::is_open(const CutNode& node, int side) {
     return std::any_of(kTouching[static_cast<std::size_t>(side)].begin(),
+                       kTouching[static_cast<std::size_t>(side)].end(),
+                       [&](int q) { return node.children[static_cast<std::size_t>(q)] < 0; });
+}
+
+// Has it nothing at all there?
+bool Cut::is_bare(const CutNode& node, int side) {
+    return std::all_of(kTouching[static_cast<std::size_t>(side)].begin(),
                        kTouching[static_cast<std::size_t>(side)].end(),
                        [&](int q) { return node.children[static_cast<std::size_t>(q)] < 0; });
 }
@@ -397,10 +422,7 @@ void Cut::constrain_neighbours(std::int32_t index) {
     const CutNode& start = nodes_[static_cast<std::size_t>(index)];
     const Level level = start.level;
     const bool leaf = !start.split;
-    Level limit = level + kOneLevel;
-    // The finest surface is only inexact where its edges move: they may move no further than its tolerance allows.
-    if (start.id.level == lattice_.deepest_level && settings_.tau_px * start.metres_per_px < start.finest_error_m)
-        limit = std::min(limit, level_of_share(settings_.tau_px * start.metres_per_px / start.finest_error_m));
+    const Level limit = edge_limit(start);
     Level own_limit = level;
     const int page_level = start.page_level;
     // Anything may move in memory when a page is split: nodes are named by their index.
@@ -410,7 +432,7 @@ void Cut::constrain_neighbours(std::int32_t index) {
             const std::int32_t other = neighbour(index, d);
             if (other < 0) break;
             if (at(other).page_level < page_level) {
-                own_limit = std::min(own_limit, at(other).level);
+                own_limit = std::min(own_limit, limit_beside(at(other)));
                 const bool asks = leaf || is_open(at(index), d);
                 if (asks && at(other).level > limit && lower(other, limit)) continue;
                 break;
@@ -454,6 +476,7 @@ bool Cut::lower(std::int32_t index, Level limit) {
     if (limit >= finest || nodes_[static_cast<std::size_t>(index)].split) return changed;
     const std::size_t first = nodes_.size();
     const bool growing = finest > level_of(minimum_exponent(node));
+    if (is_unknown(node)) return changed;
     if (growing || node.id.level == lattice_.deepest_level || !try_split(index)) {
         needs_floors_ = true;
         return changed;
@@ -486,7 +509,7 @@ void Cut::lower_descendants(std::int32_t index, Level limit) {
 // Where a page cannot be as fine as its neighbours want, or is still growing, the finer side stays coarse.
 void Cut::raise_to_floors() {
     for (std::size_t k = 0; k < nodes_.size(); ++k)
-        if (!nodes_[k].split) enqueue(static_cast<std::int32_t>(k));
+        if (!nodes_[k].split && !is_unknown(nodes_[k])) enqueue(static_cast<std::int32_t>(k));
     for (std::size_t head = 0; head < queue_.size(); ++head) {
         const std::int32_t index = queue_[head];
         CutNode& node = nodes_[static_cast<std::size_t>(index)];
@@ -527,9 +550,12 @@ Cut::Drawn Cut::drawn(std::int32_t index) {
         if (other < 0) continue;
         const CutNode& beside = nodes_[static_cast<std::size_t>(other)];
         // A smaller page is the finer mesh: this leaf's level rules.
-        if (beside.split || !beside.visible() || beside.level <= node.level) continue;
-        weight = morph_of(beside.level);
-        if (exponent_of(beside.level) > drawn.exponent) drawn.edge_mask |= 1u << d;
+        if (beside.split && beside.page_level == node.page_level && !is_bare(beside, opposite(d))) continue;
+        // Towards what a split page lacks, an edge keeps to what that was drawn at while it was whole.
+        const Level edge = beside.split ? std::min(beside.level, edge_limit(node)) : beside.level;
+        if (!beside.visible() || edge <= node.level) continue;
+        weight = morph_of(edge);
+        if (exponent_of(edge) > drawn.exponent) drawn.edge_mask |= 1u << d;
     }
     return drawn;
 }

@@ -147,7 +147,10 @@ private:
     void settle_levels();
     Level allowance(const CutNode& node, const CutNode& beside) const;
     Level limit_beside(const CutNode& node) const;
+    Level edge_limit(const CutNode& node) const;
+    bool is_unknown(const CutNode& node) const;
     static bool is_open(const CutNode& node, int side);
+    static bool is_bare(const CutNode& node, int side);
     void constrain_neighbours(std::int32_t node);
     bool lower(std::int32_t node, Level limit);
     void lower_relatives(std::int32_t node, Level limit);

@@ -17,7 +17,8 @@ constexpr std::int64_t kNoLimit = std::numeric_limits<std::int64_t>::max();
 
 /// Where slots bind, tolerances grow by eighths of an octave: steps too small to be seen.
 constexpr int kCoarseningSteps = 8;
-/// Of the slots, one in so many is not planned with once they bind.
+/// Of the slots, one in so many is not planned with: it is left for what shows that nothing finer fits. Always, or a
+/// plan that takes the last few could not be told from one too large without more than all of them.
 constexpr std::int64_t kReserve = 32;
 constexpr int kMostCoarsening = 50 * kCoarseningSteps;
 /// What a tolerance of 0 is taken for once slots bind.
@@ -82,6 +83,12 @@ struct Selector::Impl {
                 0};
     }
 
+    // Roots are always planned.
+    std::int64_t without_reserve(std::int64_t slots) const {
+        const std::int64_t roots = dataset.lattice.root_rows * dataset.lattice.root_columns;
+        return std::max(slots - slots / kReserve, std::min(slots, roots));
+    }
+
     // One plan at given coarsenings; whether it fits the slots.
     bool try_plan(const SelectionSettings& s, const Residency& residency, int geometry, int texture) {
         const CutSettings cut = cut_settings(s, geometry, texture);
@@ -95,12 +102,11 @@ struct Selector::Impl {
 
     // The finest plan that fits: textures first, as they take most of the memory, then geometry.
     void make_plan(const SelectionSettings& all, const Residency& residency) {
-        if (try_plan(all, residency, 0, 0)) return;
-        result.budget_limited = true;
-        // A few slots are left for what shows that nothing finer fits.
         SelectionSettings s = all;
-        s.height_slots -= s.height_slots / kReserve;
-        s.texture_slots -= s.texture_slots / kReserve;
+        s.height_slots = without_reserve(s.height_slots);
+        s.texture_slots = without_reserve(s.texture_slots);
+        if (try_plan(s, residency, 0, 0)) return;
+        result.budget_limited = true;
         texture_steps = least_step(texture_steps, [&](int t) { return try_plan(s, residency, kMostCoarsening, t); });
         if (texture_steps > 0) keep_proof(s, residency, kMostCoarsening, texture_steps - 1);
         geometry_steps = least_step(geometry_steps, [&](int g) { return try_plan(s, residency, g, texture_steps); });

@@ -278,41 +278,45 @@ TEST(ContinuityInTime, WhatComesLateGrowsAndSettlesToThePictureWithoutGrowth) {
 TEST(ContinuityInTime, ATextureThatComesLateIsBlendedInOverItsAncestors) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());
-    const auto terrain = test::random_terrain(random, 3);
-    const Lattice& l = terrain.lattice();
-    const glm::dvec3 middle(l.x_m(static_cast<double>(l.cells_x) / 2), l.y_m(static_cast<double>(l.cells_y) / 2),
-                            terrain.dataset().max_height_m + 20);
-    const auto views = test::views_all_round(middle);
-    SelectionSettings settings = test::with_tau(1);
-    settings.growth_s = 2;
-    test::FakeResidency residency(terrain);
-    residency.add_all();
-    for (const TileId id : terrain.textures())
-        if (id.level > 0) residency.set_texture_arrived(id, 10);
-    Selector selector(terrain.dataset());
     std::int64_t fading = 0;
-    for (const double age_s : {0.0, 0.5, 1.0, 1.75, 2.0, 3.0}) {
-        residency.set_now(10 + age_s);
-        const Selection& s = selector.select(views, settings, residency);
-        ASSERT_EQ(s.growing, age_s < 2);
-        for (const DrawItem& item : test::drawn_together(s)) {
-            const TileId texture = terrain.textures()[static_cast<std::size_t>(item.texture.slot)];
-            if (texture.level == 0 || age_s >= 2) {
-                ASSERT_EQ(item.texture_share, 1);
-                continue;
+    for (int world = 0; world < 8; ++world) {
+        const auto terrain = test::random_terrain(random, 3);
+        const Lattice& l = terrain.lattice();
+        const glm::dvec3 middle(l.x_m(static_cast<double>(l.cells_x) / 2), l.y_m(static_cast<double>(l.cells_y) / 2),
+                                terrain.dataset().max_height_m + 20);
+        const auto views = test::views_all_round(middle);
+        SelectionSettings settings = test::with_tau(1);
+        settings.texture_tau_px = 0.1;
+        settings.growth_s = 2;
+        test::FakeResidency residency(terrain);
+        residency.add_all();
+        for (const TileId id : terrain.textures())
+            if (id.level > 0) residency.set_texture_arrived(id, 10);
+        Selector selector(terrain.dataset());
+        for (const double age_s : {0.0, 0.5, 1.0, 1.75, 2.0, 3.0}) {
+            residency.set_now(10 + age_s);
+            const Selection& s = selector.select(views, settings, residency);
+            const std::int64_t before = fading;
+            for (const DrawItem& item : test::drawn_together(s)) {
+                const TileId texture = terrain.textures()[static_cast<std::size_t>(item.texture.slot)];
+                if (texture.level == 0 || age_s >= 2) {
+                    ASSERT_EQ(item.texture_share, 1);
+                    continue;
+                }
+                ASSERT_EQ(item.texture_share, static_cast<float>(age_s / 2));
+                const TileId coarse = terrain.textures()[static_cast<std::size_t>(item.coarse_texture.slot)];
+                ASSERT_EQ(coarse, parent_of(texture));
+                // Both lie at the same place: scale and offset differ by the quadrant.
+                const double extent = std::ldexp(static_cast<double>(l.tile_extent(0)), -coarse.level);
+                const double cell = static_cast<double>(l.tile_extent(item.tile.level));
+                ASSERT_EQ(static_cast<double>(item.coarse_texture.scale) * extent, cell);
+                ASSERT_EQ(static_cast<double>(item.coarse_texture.offset_u) * extent,
+                          static_cast<double>(item.tile.x) * cell - static_cast<double>(coarse.x) * extent);
+                ASSERT_EQ(static_cast<double>(item.coarse_texture.offset_v) * extent,
+                          static_cast<double>(item.tile.y) * cell - static_cast<double>(coarse.y) * extent);
+                ++fading;
             }
-            ASSERT_EQ(item.texture_share, static_cast<float>(age_s / 2));
-            const TileId coarse = terrain.textures()[static_cast<std::size_t>(item.coarse_texture.slot)];
-            ASSERT_EQ(coarse, parent_of(texture));
-            // Both lie at the same place: scale and offset differ by the quadrant.
-            const double extent = std::ldexp(static_cast<double>(l.tile_extent(0)), -coarse.level);
-            const double cell = static_cast<double>(l.tile_extent(item.tile.level));
-            ASSERT_EQ(static_cast<double>(item.coarse_texture.scale) * extent, cell);
-            ASSERT_EQ(static_cast<double>(item.coarse_texture.offset_u) * extent,
-                      static_cast<double>(item.tile.x) * cell - static_cast<double>(coarse.x) * extent);
-            ASSERT_EQ(static_cast<double>(item.coarse_texture.offset_v) * extent,
-                      static_cast<double>(item.tile.y) * cell - static_cast<double>(coarse.y) * extent);
-            ++fading;
+            ASSERT_EQ(s.growing, fading > before);
         }
     }
     EXPECT_GT(fading, 10);

@@ -82,12 +82,14 @@ TEST(ErrorBound, WhereSlotsBindTheCutIsTheUnlimitedOneAtTheLeastToleranceThatFit
                 free.texture_tau_px = texture_tau;
                 return unlimited.select({&camera, 1}, free, residency);
             };
-            // Once slots bind, one in 32 is left for the proof that nothing finer fits.
-            const auto within = [&](const Selection& free, std::int64_t share) {
-                return slots_taken(terrain, free) <= settings.height_slots - settings.height_slots / share &&
-                       texture_slots_taken(terrain, free) <= settings.texture_slots - settings.texture_slots / share;
+            // One in 32, but no root's, is left for the proof that nothing finer fits.
+            const auto planned_with = [&](std::int64_t slots) {
+                return std::max(slots - slots / 32, std::min(slots, roots));
             };
-            const auto fits = [&](const Selection& free) { return within(free, std::int64_t{1} << 40); };
+            const auto fits = [&](const Selection& free) {
+                return slots_taken(terrain, free) <= planned_with(settings.height_slots) &&
+                       texture_slots_taken(terrain, free) <= planned_with(settings.texture_slots);
+            };
             ASSERT_TRUE(fits(s));
             ASSERT_EQ(s.budget_limited, !fits(at(settings.tau_px, settings.texture_tau_px)));
             Selection free = at(s.tau_effective_px, s.texture_tau_effective_px);
@@ -105,11 +107,11 @@ TEST(ErrorBound, WhereSlotsBindTheCutIsTheUnlimitedOneAtTheLeastToleranceThatFit
             if (s.tau_effective_px > settings.tau_px) {
                 ASSERT_NEAR(steps, std::round(steps), 1e-6);
                 const double finer = std::round(steps) == 0 ? settings.tau_px : s.tau_effective_px / kStep;
-                ASSERT_FALSE(within(at(finer, s.texture_tau_effective_px), 32)) << "heights are needlessly coarse";
+                ASSERT_FALSE(fits(at(finer, s.texture_tau_effective_px))) << "heights are needlessly coarse";
                 ++by_heights;
             }
             if (s.texture_tau_effective_px > settings.texture_tau_px) {
-                ASSERT_FALSE(within(at(least * coarsest, s.texture_tau_effective_px / kStep), 32))
+                ASSERT_FALSE(fits(at(least * coarsest, s.texture_tau_effective_px / kStep)))
                     << "textures are needlessly coarse";
                 ++by_textures;
             }
@@ -162,7 +164,8 @@ TEST(ErrorBound, ASplitThatCannotBeMadeCostsNoSlots) {
             const Camera camera = test::random_camera(random, terrain);
             SelectionSettings settings = test::with_tau(0);
             const Selection plenty = selector.select({&camera, 1}, settings, residency);
-            settings.height_slots = slots_taken(terrain, plenty);
+            const std::int64_t taken = slots_taken(terrain, plenty);
+            settings.height_slots = taken + taken / 31;  // with what is reserved
             ASSERT_TRUE(test::same_selection(plenty, selector.select({&camera, 1}, settings, residency)));
         }
     }
