@@ -22,10 +22,9 @@ void DrawnTile::set(const DrawItem& item, std::span<const SlotVertex> vertices) 
         for (int i = 0; i <= cells_; i += stride_) {
             const auto k = static_cast<std::size_t>(j * (cells_ + 1) + i);
             const VertexMorph morph = vertex_morph(i, j, n, pattern);
-            positions_[k] = frame_.position(static_cast<std::int32_t>(corner.i) + i * step,
-                                            static_cast<std::int32_t>(corner.j) + j * step,
-                                            morphed_height(vertices[k], morph),
-                                            morph.weight * (morph.reach_squared * (side * side)));
+            positions_[k] = frame_.position(
+                static_cast<std::int32_t>(corner.i) + i * step, static_cast<std::int32_t>(corner.j) + j * step,
+                morphed_height(vertices[k], morph), morph.weight * (morph.reach_squared * (side * side)));
         }
 }
 

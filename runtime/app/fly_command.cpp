@@ -27,8 +27,10 @@ double milliseconds_since(Clock::time_point start) {
 
 /// Drawn before the flight, so that what OpenGL takes once for many triangles is not charged to the tiles.
 constexpr std::int64_t kWarmUpTriangles = 1'000'000;
-/// Longest that the first picture is waited for.
-constexpr double kCatchUp_s = 0.08;
+/// Longest that the coarse first picture and the true second one are waited for.
+constexpr double kCoarse_s = 0.05, kCatchUp_s = 0.15;
+/// Share of a frame that may be spent on waiting for tiles that are missing.
+constexpr double kPatience = 0.08;
 /// The coarse picture of a cold start.
 constexpr double kColdStartPx = 8;
 
@@ -131,7 +133,14 @@ private:
     Result<SceneFrame> think(int k, const Camera& camera) {
         const double now_s = std::chrono::duration<double>(Clock::now() - start_).count();
         if (fly_.wait) return scene_.complete({&camera, 1}, [] { return interrupt_flag().load(); });
-        return k == 0 ? scene_.catch_up({&camera, 1}, now_s, kCatchUp_s) : scene_.advance({&camera, 1}, now_s);
+        const Camera* views = &camera;
+        if (k > 1) return scene_.advance({views, 1}, now_s, kPatience * last_ms_ / 1000);
+        // A coarse picture at once, then a true one.
+        const double wanted_px = scene_.options().tau_px;
+        if (k == 0) scene_.options().tau_px = std::max(wanted_px, kColdStartPx);
+        const SceneFrame frame = scene_.catch_up({views, 1}, now_s, k == 0 ? kCoarse_s : kCatchUp_s);
+        scene_.options().tau_px = wanted_px;
+        return frame;
     }
 
     Result<double> frame(int k, const Camera& camera) {
@@ -145,6 +154,7 @@ private:
             display_.context().swap_buffers();
         }
         const double ms = milliseconds_since(start);
+        last_ms_ = ms;
         const double since_context = milliseconds_since(context_at_);
         if (log_.coarse_after_ms == 0 && s.max_bound_px <= kColdStartPx) log_.coarse_after_ms = since_context;
         if (log_.true_after_ms == 0 && s.max_bound_px <= options_.tau_px * (1 + 1e-9))
@@ -190,6 +200,7 @@ private:
     const ViewOptions& options_;
     const FlyOptions& fly_;
     Clock::time_point context_at_, start_;
+    double last_ms_ = 0;
     FlightLog log_;
 };
 
@@ -290,9 +301,9 @@ Result<void> run(const ViewOptions& o, const FlyOptions& f) {
     if (!ground) return ground.error();
     DisplayOptions display_options{o.width_px, o.height_px};
     display_options.window = !f.headless;
-    const auto context_at = Clock::now();
     auto display = Display::create(**scene, display_options);
     if (!display) return display.error();
+    const auto context_at = Clock::now();
     (*display)->frame_settings().wait_until_drawn = true;
     if (auto ok = (*scene)->start(**display); !ok) return ok;
     auto log = Flight(**scene, **display, **ground, o, f, context_at).fly(*path);

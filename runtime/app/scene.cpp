@@ -17,7 +17,7 @@ namespace scree {
 namespace {
 
 constexpr std::uint64_t kForesightFrames = 4;
-constexpr auto kLook = std::chrono::microseconds(500);  // between looks for arrivals
+constexpr std::chrono::milliseconds kLook{1};  // between looks for arrivals
 
 // All that a tile may fill, as the eye sees it, whether it is in memory or not.
 Box box_of(const Dataset& d, TileId id, glm::dvec3 eye, double half_curvature) {
@@ -132,31 +132,38 @@ SceneFrame Scene::think(std::span<const Camera> views, double growth_s) {
     return frame;
 }
 
-SceneFrame Scene::advance(std::span<const Camera> views, double now_s) {
+// Takes what arrives and chooses anew, until nothing is missing or so much time has passed.
+SceneFrame Scene::think_again(std::span<const Camera> views, double growth_s, SceneFrame frame, double seconds) {
+    const auto start = std::chrono::steady_clock::now();
+    while (frame.stand_ins && !pager_->idle() &&
+           std::chrono::steady_clock::now() - start < std::chrono::duration<double>(seconds)) {
+        // To wait for an arrival would be to wait as long as a slow disk likes.
+        std::this_thread::sleep_for(kLook);
+        const int taken = pager_->take_arrivals(options_.upload_bytes_per_frame, false);
+        if (taken == 0) continue;
+        const std::int64_t uploads = frame.uploads + taken;
+        const double before_ms = frame.select_ms;
+        frame = think(views, growth_s);
+        frame.uploads = uploads;
+        frame.select_ms += before_ms;
+    }
+    return frame;
+}
+
+SceneFrame Scene::advance(std::span<const Camera> views, double now_s, double patience_s) {
     pager_->advance_clock(now_s);
     const int uploads = pager_->take_arrivals(options_.upload_bytes_per_frame, false);
     SceneFrame frame = think(views, options_.growth_s);
     frame.uploads = uploads;
-    return frame;
+    return think_again(views, options_.growth_s, frame, patience_s);
 }
 
 SceneFrame Scene::catch_up(std::span<const Camera> views, double now_s, double seconds) {
-    // What comes before the first picture has nothing to grow out of: it came before time began.
-    pager_->advance_clock(now_s - 2 * options_.growth_s);
-    const auto start = std::chrono::steady_clock::now();
-    std::int64_t uploads = 0;
-    think(views, 0);
-    while (!pager_->idle() && std::chrono::steady_clock::now() - start < std::chrono::duration<double>(seconds)) {
-        const int taken = pager_->take_arrivals(options_.upload_bytes_per_frame, false);
-        uploads += taken;
-        // To wait for an arrival would be to wait as long as a slow disk likes.
-        if (taken == 0)
-            std::this_thread::sleep_for(kLook);
-        else
-            think(views, 0);
-    }
+    // It came so long ago that even the deepest page, which waits for all above it, has grown.
+    pager_->advance_clock(now_s - (kMaxLevel + 2) * options_.growth_s);
+    const SceneFrame first = think_again(views, 0, think(views, 0), seconds);
     SceneFrame frame = advance(views, now_s);
-    frame.uploads += uploads;
+    frame.uploads += first.uploads;
     return frame;
 }
 

@@ -51,10 +51,12 @@ public:
     const Pager& pager() const { return *pager_; }
     SceneOptions& options() { return options_; }
 
-    /// One frame's arrivals, selection and requests at `now_s`, a clock that only has to move forward. The selection is
-    /// valid until the next call.
-    SceneFrame advance(std::span<const Camera> views, double now_s);
-    /// advance() again and again until nothing is missing or `seconds` have passed: a first picture that is not coarse.
+    /// One frame's arrivals, selection and requests at `now_s`, a clock that only has to move forward. While tiles are
+    /// missing it may look again for `patience_s`: what is a small part of a long frame fills the gaps of the picture.
+    /// The selection is valid until the next call.
+    SceneFrame advance(std::span<const Camera> views, double now_s, double patience_s = 0);
+    /// The first pictures: looks again until nothing is missing or `seconds` have passed, and what comes meanwhile has
+    /// nothing to grow out of.
     SceneFrame catch_up(std::span<const Camera> views, double now_s, double seconds);
     /// The same until nothing is missing, and nothing grows. Errors: ErrorCode::store if what is missing never comes.
     Result<SceneFrame> complete(std::span<const Camera> views, const std::function<bool()>& stop = {});
@@ -62,6 +64,7 @@ public:
 private:
     Scene(const SqliteStore& store, const SceneOptions& options, const MemoryPlan& memory);
     SceneFrame think(std::span<const Camera> views, double growth_s);
+    SceneFrame think_again(std::span<const Camera> views, double growth_s, SceneFrame frame, double seconds);
     SelectionSettings selection_settings(double half_curvature, double growth_s) const;
     bool look_ahead(std::span<const Camera> views, SelectionSettings settings);
     Pager::Wishes with_foreseen(const Pager::Wishes& now, bool fresh);

@@ -36,6 +36,8 @@ HudLines status_lines(const Scene& scene, const SceneFrame& frame, const FlightP
 
 /// Of the window's height and width.
 constexpr double kInsetShare = 0.35;
+/// Share of a frame that may be spent on waiting for tiles that are missing.
+constexpr double kPatience = 0.08;
 /// Longest that the first picture is waited for.
 constexpr double kCatchUp_s = 0.08;
 
@@ -132,7 +134,8 @@ Result<void> view(ViewOptions o, const WindowSettings& w) {
             if (!above) return above.error();
             views.push_back(*above);
         }
-        const SceneFrame frame = first ? (*scene)->catch_up(views, now_s, kCatchUp_s) : (*scene)->advance(views, now_s);
+        const SceneFrame frame = first ? (*scene)->catch_up(views, now_s, kCatchUp_s)
+                                       : (*scene)->advance(views, now_s, kPatience * mean_frame_s);
         first = false;
         if (!redraw && !controls.moved() && !frame.stand_ins && frame.uploads == 0) {
             glfwWaitEventsTimeout(0.1);  // nothing changes: leave the core alone
