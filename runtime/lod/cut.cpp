@@ -126,7 +126,7 @@ void Cut::judge_texture(CutNode& node) const {
     const double doublings = std::min(std::log2(node.texture_need), 64.0);
     double limit = 0;
     if (!parts) {
-        node.doublings = doublings;
+        node.approach = level_of_share(std::clamp(kTextureApproach * doublings, -1.0, 1.0));
         limit = maximum_exponent(node) - 1 + kTextureApproach * std::max(0.0, -doublings);
     } else {
         // Textures deeper than the heights are drawn on parts of the page, each of one block of cells at least.
@@ -190,13 +190,22 @@ void Cut::add_roots() {
 
 // The node across one side, as large as this one or larger; a larger one that is split is the one that lacks the page
 // across. Links are brought up to date as they are used: a child starts with its parent's.
-std::int32_t Cut::neighbour(std::int32_t index, int direction) {
+inline std::int32_t Cut::neighbour(std::int32_t index, int direction) {
+    const CutNode& node = nodes_[static_cast<std::size_t>(index)];
+    const std::int32_t link = node.neighbours[static_cast<std::size_t>(direction)];
+    if (link < 0) return link;
+    const CutNode& other = nodes_[static_cast<std::size_t>(link)];
+    return !other.split || other.page_level >= node.page_level ? link : descend(index, direction);
+}
+
+std::int32_t Cut::descend(std::int32_t index, int direction) {
     CutNode& node = nodes_[static_cast<std::size_t>(index)];
     std::int32_t& link = node.neighbours[static_cast<std::size_t>(direction)];
-    while (link >= 0) {
+    const TileId beyond = across(node.id, direction);
+    for (;;) {
         const CutNode& other = nodes_[static_cast<std::size_t>(link)];
         if (!other.split || other.page_level >= node.page_level) break;
-        const std::int32_t child = other.children[quadrant_towards(across(node.id, direction), other.page_level)];
+        const std::int32_t child = other.children[quadrant_towards(beyond, other.page_level)];
         if (child < 0) break;
         link = child;
     }
@@ -245,7 +254,9 @@ bool Cut::try_split(std::int32_t index) {
                 if (!try_split(other)) return false;
             }
     }
-    const CutNode parent = nodes_[static_cast<std::size_t>(index)];
+    // References into the nodes stay good while their children are added.
+    if (nodes_.capacity() < nodes_.size() + 4) nodes_.reserve(2 * nodes_.size() + 64);
+    const CutNode& parent = nodes_[static_cast<std::size_t>(index)];
     const HeightTileHeader& header = residency_->heights.headers[static_cast<std::size_t>(parent.slot)];
     if (header.child_mask == 0) return false;
     const auto& slots = residency_->heights.children[static_cast<std::size_t>(parent.slot)];
@@ -377,22 +388,23 @@ void Cut::settle_levels() {
 // How far above its neighbour of the same size a page may be: a level, but where one of them is split for its texture
 // and the other is not, or is about to be, its children would not be allowed above the neighbour at all.
 Level Cut::allowance(const CutNode& node, const CutNode& beside) const {
-    if (!(node.doublings > -1 / kTextureApproach)) return kOneLevel;
-    return level_of_share(std::clamp(kTextureApproach * std::max(-node.doublings, beside.doublings), 0.0, 1.0));
+    if (node.approach <= -kOneLevel) return kOneLevel;
+    return std::max({-node.approach, beside.approach, Level{0}});
 }
 
 // How coarse a smaller page may be: no coarser than a leaf; less and less bound to what was one as its need has grown.
 Level Cut::limit_beside(const CutNode& node) const {
     if (!node.split) return node.level;
-    return node.level + level_of_share(std::clamp(kTextureApproach * node.doublings, 0.0, 1.0));
+    return node.level + std::max(node.approach, Level{0});
 }
 
 // How coarse an edge may be. The finest surface is only inexact where its edges move: they may move no further than its
 // tolerance allows.
 Level Cut::edge_limit(const CutNode& node) const {
     const Level limit = node.level + kOneLevel;
+    if (node.page_level < lattice_.deepest_level) return limit;
     const double allowed_m = settings_.tau_px * node.metres_per_px;
-    if (node.id.level < lattice_.deepest_level || !(allowed_m < node.finest_error_m)) return limit;
+    if (!(allowed_m < node.finest_error_m)) return limit;
     return std::min(limit, level_of_share(allowed_m / node.finest_error_m));
 }
 

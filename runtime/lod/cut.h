@@ -58,9 +58,11 @@ struct alignas(64) CutNode {
     std::array<std::int32_t, 4> neighbours{-1, -1, -1, -1};  ///< by Direction: a node as large or larger, or -1
     std::array<std::int32_t, 4> children{-1, -1, -1, -1};    ///< -1: does not exist, or the node is not split
     std::int32_t parent = -1;
-    std::int32_t slot = kNotResident;          ///< of its height tile
-    std::int32_t texture_slot = kNotResident;  ///< of the texture tile of the same address
+    std::int32_t slot = kNotResident;  ///< of its height tile
+    Level approach = -kOneLevel;       ///< log2 of texture_need where it may split the page, against kTextureApproach
 
+    std::int32_t texture_slot = kNotResident;  ///< of the texture tile of the same address
+    std::uint32_t inside = 0;                  ///< views that see all of its box
     TileId id;
     const HeightBounds* bounds = nullptr;
     double metres_per_px = 0;        ///< least over the views that see it of d / (f K): error allowed for one pixel
@@ -68,10 +70,8 @@ struct alignas(64) CutNode {
     double west_m = 0, north_m = 0;  ///< its north-west corner
     double finest_error_m = 0;       ///< of its own densest mesh, thinned edges included
     double texture_need = 0;         ///< of its own texture over the tolerance, where finer textures exist
-    double doublings = -std::numeric_limits<double>::infinity();  ///< log2 of texture_need where it may split the page
     double grows_from_s = -std::numeric_limits<double>::infinity();  ///< when it begins to leave its parent's shape
     double priority = 0;                                             ///< need of the parent when it was split
-    std::uint32_t inside = 0;                                        ///< views that see all of its box
 
     bool visible() const { return seen_by != 0; }
 };
@@ -129,6 +129,7 @@ public:
 
 private:
     std::int32_t neighbour(std::int32_t node, int direction);
+    std::int32_t descend(std::int32_t node, int direction);
     template <class Visit>
     void for_each_leaf_on(std::int32_t node, int side, const Visit& visit) const;
     template <class Visit>
