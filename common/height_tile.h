@@ -17,6 +17,8 @@ inline constexpr std::int32_t kMaxHeightUnits = (1 << 23) - 1;
 /// Errors of successive levels differ by this factor at least: a level whose error is that of the next would be left as
 /// soon as it is reached, and its morph would be a jump (Scree lod, C15).
 inline constexpr float kErrorGrowth = 1.25f;
+/// No surface errs by more: an error of this size grows no further.
+inline constexpr float kMaxErrorUnits = 4.0f * static_cast<float>(kMaxHeightUnits);
 
 /// Height range and certified errors of the terrain under one tile's extent, in quanta.
 struct HeightBounds {

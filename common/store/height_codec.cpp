@@ -35,7 +35,7 @@ bool read_bounds(ByteReader& in, HeightBounds& bounds, int levels) {
     float previous = 0;
     for (int g = 0; g < levels; ++g) {
         const float error = in.f32();
-        good = good && std::isfinite(error) && error >= previous && error <= 4.0f * kMaxHeightUnits;
+        good = good && std::isfinite(error) && error >= previous && error <= kMaxErrorUnits;
         bounds.error_n[static_cast<std::size_t>(g)] = error;
         previous = error;
     }

@@ -1,5 +1,5 @@
-// What a frame's thinking costs, without drawing: selection, culling, stitching and requests, flown over a store with all
-// that is wanted resident, then the same poses as a flight meets them.
+// What a frame's thinking costs, without drawing: selection, culling, stitching and requests, flown over a store with
+// all that is wanted resident, then the same poses as a flight meets them.
 //     scree_selection_bench STORE [TAU] [FRAMES] [METRES A FRAME]
 #include <fmt/format.h>
 
@@ -29,8 +29,8 @@ int run(const std::string& file, double tau_px, int frames, double step_m) {
     if (!key_poses) return 1;
     const FlightPath path = paced(*key_poses, step_m, frames);
     for (const bool settled : {true, false}) {
-        options.growth_s = settled ? 0 : 0.15;
-        options.foresight_s = settled ? 0 : 1;
+        options.growth_s = settled ? 0 : SceneOptions{}.growth_s;
+        options.foresight_s = settled ? 0 : SceneOptions{}.foresight_s;
         auto scene = Scene::open(**store, options);
         NoSink sink;
         if (!scene || !(*scene)->start(sink)) return 1;

@@ -236,7 +236,8 @@ private:
     void let_errors_grow(HeightBounds& bounds) const {
         for (int g = 1; g < n_; ++g) {
             float& error = bounds.error_n[static_cast<std::size_t>(g)];
-            error = std::max(error, kErrorGrowth * bounds.error_n[static_cast<std::size_t>(g - 1)]);
+            const float grown = kErrorGrowth * bounds.error_n[static_cast<std::size_t>(g - 1)];
+            error = std::max(error, std::min(grown, kMaxErrorUnits));
         }
     }
 

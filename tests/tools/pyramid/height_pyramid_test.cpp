@@ -232,6 +232,40 @@ TEST(HeightPyramid, ThinTerrainsHaveManyRoots) {
     }
 }
 
+TEST(HeightPyramid, ErrorsOfTheGreatestReliefStayWithinTheFormat) {
+    constexpr int kSamples = 258;
+    const test::TemporaryFolder folder;
+    auto spool = HeightSpool::create(folder.file("heights"), kSamples, kSamples, false);
+    ASSERT_TRUE(spool);
+    for (int j = 0; j < kSamples; ++j) {
+        std::vector<double> row;
+        for (int i = 0; i < kSamples; ++i) row.push_back((i + j) % 2 == 0 ? kMaxHeightUnits : -kMaxHeightUnits);
+        ASSERT_TRUE((*spool)->append(row));
+    }
+    ASSERT_TRUE((*spool)->finish());
+    auto writer = SqliteStoreWriter::create(folder.file("s.scree"));
+    ASSERT_TRUE(writer);
+    const Lattice lattice = *make_lattice(0, 0, 1, kSamples - 1, kSamples - 1, 2);
+    auto built =
+        build_height_pyramid({spool->get(), writer->get(), lattice, {1, 0, 0, 1}, [](std::int64_t) { return true; }});
+    ASSERT_TRUE(built) << built.error().message;
+    Dataset dataset;
+    dataset.lattice = lattice;
+    dataset.height_tiles = built->tile_count;
+    dataset.present_cells = built->present_cells;
+    dataset.min_height_m = built->min_n;
+    dataset.max_height_m = built->max_n;
+    dataset.texture_tiles = 1;
+    ASSERT_TRUE((*writer)->finish(dataset));
+    auto store = SqliteStore::open(folder.file("s.scree"));
+    ASSERT_TRUE(store) << store.error().message;
+    auto reader = (*store)->open_reader();
+    ASSERT_TRUE(reader);
+    auto root = read_height_tile(**reader, dataset, {0, 0, 0});
+    ASSERT_TRUE(root) << root.error().message;
+    EXPECT_EQ(root->header.own.error_n[1], kMaxErrorUnits);
+}
+
 TEST(HeightPyramid, StopsWhenAsked) {
     const test::TemporaryFolder folder;
     auto spool = HeightSpool::create(folder.file("heights"), 20, 20, false);
