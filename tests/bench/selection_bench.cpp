@@ -3,7 +3,6 @@
 //     scree_selection_bench STORE [TAU] [FRAMES] [METRES A FRAME]
 #include <fmt/format.h>
 
-#include <bit>
 #include <chrono>
 #include <cstdlib>
 #include <thread>
@@ -36,7 +35,7 @@ int run(const std::string& file, double tau_px, int frames, double step_m) {
         NoSink sink;
         if (!scene || !(*scene)->start(sink)) return 1;
         Series select_us, nodes, triangles;
-        double now_s = 0; std::uint64_t hash = 0; std::int64_t steps = 0;
+        double now_s = 0;
         for (const FlightPose& pose : path) {
             auto camera = look_at(pose.eye, pose.look, 40, 800, 800);
             if (!camera) return 1;
@@ -45,17 +44,9 @@ int run(const std::string& file, double tau_px, int frames, double step_m) {
             if (settled && !(*scene)->complete({&*camera, 1})) return 1;
             const SceneFrame frame = (*scene)->advance({&*camera, 1}, settled ? now_s + 1e6 : now_s);
             select_us.add(1e3 * frame.select_ms);
-            for (const auto& list : frame.selection->draws) for (const auto& i : list) {
-                std::uint64_t h = 1469598103934665603u; auto mix=[&](std::uint64_t v){h=(h^v)*1099511628211u; h^=h>>29;};
-                mix(static_cast<std::uint64_t>(i.tile.level)); mix(static_cast<std::uint64_t>(i.tile.x)); mix(static_cast<std::uint64_t>(i.tile.y));
-                mix(static_cast<std::uint64_t>(i.geomip)); mix(i.edge_mask); mix(std::bit_cast<std::uint32_t>(i.morph)); for(float f:i.edge_morph) mix(std::bit_cast<std::uint32_t>(f));
-                mix(static_cast<std::uint64_t>(i.texture.slot>=0)); mix(std::bit_cast<std::uint32_t>(i.texture.scale)); mix(std::bit_cast<std::uint32_t>(i.texture.offset_u)); for (auto n:i.neighbour_textures) mix(static_cast<std::uint64_t>(n>=0));
-                hash += h; }
-            if (settled) steps += frame.selection->refine_steps;
             nodes.add(static_cast<double>(frame.selection->nodes));
             triangles.add(static_cast<double>(frame.selection->triangles));
         }
-        fmt::print("hash {:x} steps {}\n", hash, steps);
         fmt::print("{}: median {:.1f} us, p99 {:.1f} us, max {:.1f} us; {:.0f} tiles, {:.0f} triangles (mean)\n",
                    settled ? "settled" : "flown", select_us.quantile(0.5), select_us.quantile(0.99), select_us.max(),
                    nodes.mean(), triangles.mean());
