@@ -15,6 +15,9 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// doubling of the need.
 constexpr double kTextureApproach = 4;
 
+/// Less than 2^(-1 / kTextureApproach): a need below it asks nothing of a page yet.
+constexpr double kNotYetApproaching = 0.84;
+
 int opposite(int direction) { return (direction + 2) % 4; }
 
 TileId across(TileId id, int direction) {
@@ -123,6 +126,7 @@ void Cut::judge_texture(CutNode& node) const {
         texel_m_[static_cast<std::size_t>(node.id.level)] / node.texel_per_px / settings_.texture_tau_px;
     const bool parts = node.id.level == lattice_.deepest_level;
     if (parts && node.texture_need <= 1) return;
+    if (!parts && node.texture_need < kNotYetApproaching) return;
     const double doublings = std::min(std::log2(node.texture_need), 64.0);
     double limit = 0;
     if (!parts) {
@@ -490,7 +494,7 @@ bool Cut::lower(std::int32_t index, Level limit) {
     const bool growing = finest > level_of(minimum_exponent(node));
     if (is_unknown(node)) return changed;
     if (growing || node.id.level == lattice_.deepest_level || !try_split(index)) {
-        needs_floors_ = true;
+        needs_floors_ = nodes_[static_cast<std::size_t>(index)].refused = true;
         return changed;
     }
     consider_from(first);
@@ -520,8 +524,12 @@ void Cut::lower_descendants(std::int32_t index, Level limit) {
 
 // Where a page cannot be as fine as its neighbours want, or is still growing, the finer side stays coarse.
 void Cut::raise_to_floors() {
-    for (std::size_t k = 0; k < nodes_.size(); ++k)
-        if (!nodes_[k].split && !is_unknown(nodes_[k])) enqueue(static_cast<std::int32_t>(k));
+    // All others found their neighbours as coarse as they need them.
+    for (std::size_t k = 0; k < nodes_.size(); ++k) {
+        const CutNode& node = nodes_[k];
+        const bool coarse = node.refused || node.floor > level_of(minimum_exponent(node));
+        if (coarse && !node.split && !is_unknown(node)) enqueue(static_cast<std::int32_t>(k));
+    }
     for (std::size_t head = 0; head < queue_.size(); ++head) {
         const std::int32_t index = queue_[head];
         CutNode& node = nodes_[static_cast<std::size_t>(index)];

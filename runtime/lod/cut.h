@@ -51,6 +51,7 @@ struct alignas(64) CutNode {
     bool split = false;
     bool wants_geometry = false;  ///< its finest mesh is not good enough
     bool queued = false;
+    bool refused = false;        ///< neighbours want it finer than it can be
     std::int8_t page_level = 0;  ///< id.level
     std::uint32_t seen_by = 0;   ///< views that may see its box; without any it is neither refined nor drawn
     Level level = 0;             ///< drawn; of a split node: what it would be drawn at as a leaf

@@ -24,7 +24,9 @@ struct SelectionSettings {
     double tau_px = 1;  ///< screen-space error: smaller is truer and costs triangles (about 1/tau)
     double texture_tau_px =
         1;  ///< screen pixels a texel may cover: smaller is sharper and costs texture slots (1/tau^2)
-    std::int64_t height_slots = 0;  ///< tiles that can be kept, parents of what is drawn included
+    /// Tiles that can be kept, parents of what is drawn included; one in 32 is left for what shows that no finer plan
+    /// fits.
+    std::int64_t height_slots = 0;
     std::int64_t texture_slots = 0;
     double half_curvature = 0;  ///< 1 / (2 R) of the earth, 1/m; 0: flat
     bool morph = true;          ///< false: discrete levels

@@ -68,7 +68,7 @@ TEST(Balance, RandomCutsOverRandomResidencyAreWatertightAndDrawEveryVisibleCellO
     EXPECT_GT(mixed_levels, 1000);
     EXPECT_GT(refined, 500);
     EXPECT_GT(morphed, 1000);
-    EXPECT_GT(edges_apart, 500);
+    EXPECT_GT(edges_apart, 200);
 }
 
 TEST(Balance, HoldsWhereOneLoneTileOfManyLevelsIsMissing) {

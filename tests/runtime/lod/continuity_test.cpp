@@ -174,6 +174,12 @@ TEST(ContinuityInSpace, NoVertexPopsWherePagesAreSplitForTheirShape) {
     EXPECT_GT(r.mixed, 500);
 }
 
+// Worlds in which a page beside an absent area is split and made whole again.
+TEST(ContinuityInSpace, NoVertexPopsWhereAPageLacksAChild) {
+    test::Random random(5);
+    EXPECT_EQ(fly(random, {}, 11).pops, 0);
+}
+
 TEST(ContinuityInSpace, NoVertexPopsOverACurvedEarth) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());
