@@ -41,10 +41,21 @@ constexpr double kPatience = 0.08;
 /// Longest that the first picture is waited for.
 constexpr double kCatchUp_s = 0.08;
 
-// Straight down on the eye's surroundings, north up.
-Result<Camera> view_from_above(const Camera& main, double extent_m, double ground_m, int width_px, int height_px) {
-    const double above_m = std::clamp(6 * (main.eye.z - ground_m), 0.02 * extent_m, extent_m);
-    return look_at(main.eye + glm::dvec3(0, 0, above_m), main.eye, 40, width_px, height_px);
+// Straight down on what the eye looks at, or stands over where that is beyond the data; north up.
+Result<Camera> view_from_above(const Camera& main, const Dataset& d, double ground_m, int width_px, int height_px) {
+    const Lattice& l = d.lattice;
+    const glm::dvec2 north_west{l.x_m(0), l.y_m(0)};
+    const glm::dvec2 south_east{l.x_m(static_cast<double>(l.cells_x)), l.y_m(static_cast<double>(l.cells_y))};
+    const double extent_m = std::max(south_east.x - north_west.x, north_west.y - south_east.y);
+    const double above_ground_m = std::max(main.eye.z - ground_m, 1.0);
+    glm::dvec2 over(main.eye);
+    if (main.forward.z < 0) {
+        const double reach_m = std::min(above_ground_m / -main.forward.z, 2 * extent_m);
+        over += reach_m * glm::dvec2(main.forward);
+    }
+    over = {std::clamp(over.x, north_west.x, south_east.x), std::clamp(over.y, south_east.y, north_west.y)};
+    const double above_m = std::clamp(6 * above_ground_m, 0.05 * extent_m, 1.5 * extent_m);
+    return look_at({over.x, over.y, ground_m + above_m}, {over.x, over.y, ground_m}, 40, width_px, height_px);
 }
 
 struct WindowSettings {
@@ -129,8 +140,7 @@ Result<void> view(ViewOptions o, const WindowSettings& w) {
                 if (auto ok = (*display)->resize_inset(inset_width, inset_height); !ok) return ok;
                 second_size = {inset_width, inset_height};
             }
-            auto above =
-                view_from_above(*camera, extent, std::max(ground_m, d.min_height_m), inset_width, inset_height);
+            auto above = view_from_above(*camera, d, std::max(ground_m, d.min_height_m), inset_width, inset_height);
             if (!above) return above.error();
             views.push_back(*above);
         }
