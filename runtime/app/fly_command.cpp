@@ -52,7 +52,7 @@ struct FlyOptions {
 struct FlightLog {
     Series frame_ms, select_ms, triangles, tiles, tau, bound, mean_bound;
     Series settled_triangles, settled_mean_bound;  // of the same poses, when nothing is missing
-    std::int64_t stand_ins = 0, holes = 0, limited = 0, see_through = 0, looked_through = 0;
+    std::int64_t stand_ins = 0, reused = 0, holes = 0, limited = 0, see_through = 0, looked_through = 0;
     double coarse_after_ms = 0, true_after_ms = 0;  // from the context on; 0: never
     std::int64_t fixed_rss_bytes = 0;
     std::string csv =
@@ -69,6 +69,7 @@ struct FlightLog {
         bound.add(s.max_bound_px);
         mean_bound.add(s.mean_bound_px);
         stand_ins += frame.stand_ins ? 1 : 0;
+        reused += frame.reused ? 1 : 0;
         limited += s.budget_limited ? 1 : 0;
         holes += frame_holes;
         csv += fmt::format("{},{:.3f},{:.4f},{},{},{},{},{},{},{:.4f},{:.4f},{:.4f},{}\n", k, ms, frame.select_ms,
@@ -234,6 +235,7 @@ nlohmann::ordered_json report_of(const FlightLog& log, const Scene& scene, const
         {"heights_loaded", loader_report(scene.pager().loader_counters(TileKind::height))},
         {"textures_loaded", loader_report(scene.pager().loader_counters(TileKind::texture))},
         {"frames_with_stand_ins", log.stand_ins},
+        {"selections_reused", log.reused},
         {"budget_limited_frames", log.limited},
         {"holes", log.holes},
         {"max_bound_px", log.bound.max()},

@@ -37,6 +37,7 @@ struct SceneFrame {
     double select_ms = 0;  ///< selection and requests, CPU time of the thread
     std::int64_t uploads = 0;
     bool stand_ins = false;  ///< drawn coarser than full residency would
+    bool reused = false;     ///< nothing had changed: the last frame's selection, not chosen again
 };
 
 class Scene {
@@ -64,6 +65,7 @@ public:
 private:
     Scene(const SqliteStore& store, const SceneOptions& options, const MemoryPlan& memory);
     SceneFrame think(std::span<const Camera> views, double growth_s);
+    bool nothing_changed(std::span<const Camera> views, const SelectionSettings& settings) const;
     SceneFrame think_again(std::span<const Camera> views, double growth_s, SceneFrame frame, double seconds);
     SelectionSettings selection_settings(double half_curvature, double growth_s) const;
     bool look_ahead(std::span<const Camera> views, SelectionSettings settings);
@@ -80,6 +82,11 @@ private:
     std::vector<std::int32_t> standing_heights_, standing_textures_;
     std::vector<TileRequest> requests_, foreseen_requests_;
     std::uint64_t frame_ = 0;
+    // What the last selection was chosen from, to know when it need not be chosen again.
+    SceneFrame last_;
+    std::vector<Camera> last_views_;
+    SelectionSettings last_settings_;
+    std::int64_t last_changes_ = -1;
 };
 
 }  // namespace scree

@@ -112,6 +112,35 @@ TEST_F(SceneOfHills, CompleteEndsWithNothingMissingAndNothingGrowing) {
     EXPECT_EQ(again->selection->triangles, frame->selection->triangles);
 }
 
+TEST_F(SceneOfHills, WhereNothingHasChangedTheSelectionIsNotMadeAgain) {
+    Staged staged(*stored_, small_options());
+    Camera camera = stored_->camera(200, 512);
+    double now_s = 0;
+    const auto next = [&] { return staged.scene->advance({&camera, 1}, now_s += 0.05); };
+    SceneFrame frame = next();
+    for (int k = 0; k < 4000 && !frame.reused; ++k) {
+        ASSERT_FALSE(frame.reused);
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        frame = next();
+    }
+    ASSERT_TRUE(frame.reused);
+    EXPECT_FALSE(frame.stand_ins);
+    EXPECT_FALSE(frame.selection->growing);
+    const std::int64_t triangles = frame.selection->triangles;
+    EXPECT_TRUE(next().reused);
+    const auto settled = staged.scene->complete({&camera, 1});
+    ASSERT_TRUE(settled.ok());
+    EXPECT_EQ(settled->selection->triangles, triangles);
+    camera.eye.x += 1e-6;
+    EXPECT_FALSE(next().reused);
+    camera.fov_deg += 1e-6;
+    EXPECT_FALSE(next().reused);
+    staged.scene->options().tau_px *= 1 + 1e-12;
+    EXPECT_FALSE(next().reused);
+    const std::vector<Camera> two{camera, camera};
+    EXPECT_FALSE(staged.scene->advance(two, now_s).reused);
+}
+
 TEST_F(SceneOfHills, CompleteStopsWhenAsked) {
     Staged staged(*stored_, small_options());
     const Camera camera = stored_->camera(200, 512);
