@@ -76,10 +76,11 @@ struct FlightLog {
                            s.triangles, s.nodes, frame.uploads, s.requests.size(), frame.stand_ins ? 1 : 0, frame_holes,
                            s.max_bound_px, s.mean_bound_px, s.tau_effective_px, resident_bytes());
     }
-    // Least share of the settled triangles that was drawn while flying; 1 without a settled flight.
+    // Least share of the settled triangles that was drawn while flying, after the coarse and the true first picture; 1
+    // without a settled flight.
     double least_triangle_share() const {
         double least = 1;
-        for (std::size_t k = 0; k < settled_triangles.values.size(); ++k)
+        for (std::size_t k = 2; k < settled_triangles.values.size(); ++k)
             if (settled_triangles.values[k] > 0)
                 least = std::min(least, triangles.values[k] / settled_triangles.values[k]);
         return least;

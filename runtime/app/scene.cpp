@@ -32,6 +32,9 @@ Box box_of(const Dataset& d, TileId id, glm::dvec3 eye, double half_curvature) {
     return box;
 }
 
+constexpr double kMotionFades_s = 0.4;
+constexpr double kStill_m = 1e-3;
+
 /// Grows whenever a tile comes, goes or turns out to be damaged.
 std::int64_t changes(const PagerCounters& c) { return c.tiles_paged_in + c.tiles_paged_out + c.damaged_tiles; }
 
@@ -67,7 +70,17 @@ SelectionSettings Scene::selection_settings(double half_curvature, double growth
             memory_.texture_slots,
             half_curvature,
             options_.morph,
-            growth_s};
+            growth_s,
+            moved_m_};
+}
+
+void Scene::note_motion(std::span<const Camera> views, double now_s) {
+    if (views.empty()) return;
+    const double moved_m = last_views_.empty() ? 0 : glm::length(views[0].eye - last_eye_);
+    moved_m_ = std::max(moved_m, moved_m_ * std::exp(-(now_s - last_now_s_) / kMotionFades_s));
+    if (moved_m_ < kStill_m) moved_m_ = 0;
+    last_eye_ = views[0].eye;
+    last_now_s_ = now_s;
 }
 
 // What the eye will want if it goes on as it does. Chosen every few frames, because the answer hardly changes; asked
@@ -180,6 +193,7 @@ SceneFrame Scene::think_again(std::span<const Camera> views, double growth_s, Sc
 
 SceneFrame Scene::advance(std::span<const Camera> views, double now_s, double patience_s) {
     pager_->advance_clock(now_s);
+    note_motion(views, now_s);
     const int uploads = pager_->take_arrivals(options_.upload_bytes_per_frame, false);
     SceneFrame frame = think(views, options_.growth_s);
     frame.uploads = uploads;

@@ -64,6 +64,7 @@ public:
 
 private:
     Scene(const SqliteStore& store, const SceneOptions& options, const MemoryPlan& memory);
+    void note_motion(std::span<const Camera> views, double now_s);
     SceneFrame think(std::span<const Camera> views, double growth_s);
     bool nothing_changed(std::span<const Camera> views, const SelectionSettings& settings) const;
     SceneFrame think_again(std::span<const Camera> views, double growth_s, SceneFrame frame, double seconds);
@@ -84,6 +85,9 @@ private:
     std::uint64_t frame_ = 0;
     // What the last selection was chosen from, to know when it need not be chosen again.
     SceneFrame last_;
+    glm::dvec3 last_eye_{0};
+    double last_now_s_ = 0;
+    double moved_m_ = 0;  ///< by the eye in a frame; falls slowly, lest what has come without growing shrinks back
     std::vector<Camera> last_views_;
     SelectionSettings last_settings_;
     std::int64_t last_changes_ = -1;

@@ -18,6 +18,9 @@ constexpr double kTextureApproach = 4;
 /// Less than 2^(-1 / kTextureApproach): a need below it asks nothing of a page yet.
 constexpr double kNotYetApproaching = 0.84;
 
+/// Pixels across the screen in a frame at which a change of shape is no longer seen.
+constexpr double kBlur_px = 16;
+
 int opposite(int direction) { return (direction + 2) % 4; }
 
 TileId across(TileId id, int direction) {
@@ -309,14 +312,17 @@ bool Cut::try_split(std::int32_t index) {
 void Cut::grow(std::int32_t index) {
     const CutNode& parent = nodes_[static_cast<std::size_t>(index)];
     const Level parents_finest = level_of(minimum_exponent(parent));
-    double from_s = parent.grows_from_s + settings_.growth_s;
+    // The nearer it is to where nobody could follow it with his eyes, the quicker.
+    const double parallax_px = settings_.moved_m / parent.texel_per_px;
+    const double growth_s = settings_.growth_s * std::max(0.0, 1 - parallax_px / kBlur_px);
+    double from_s = parent.grows_from_s + growth_s;
     for (const std::int32_t child : parent.children) {
         if (child < 0) continue;
         const CutNode& node = nodes_[static_cast<std::size_t>(child)];
         if (node.visible() && node.slot >= 0)
             from_s = std::max(from_s, residency_->heights.arrived_s[static_cast<std::size_t>(node.slot)]);
     }
-    const double share = (residency_->now_s - from_s) / settings_.growth_s;
+    const double share = growth_s > 0 ? (residency_->now_s - from_s) / growth_s : 1;
     Level floor = std::numeric_limits<Level>::min();
     if (share < 1) floor = parents_finest - level_of_share(std::max(share, 0.0));
     if (parent.floor > parents_finest) floor = std::max(floor, parent.floor);

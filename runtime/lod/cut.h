@@ -85,6 +85,7 @@ struct CutSettings {
     double half_curvature = 0;   ///< 1 / (2 R), 1/m
     /// Seconds in which a page that came late grows out of its parent's shape by one level; 0: at once.
     double growth_s = 0;
+    double moved_m = 0;  ///< by the eye from frame to frame: what moves across the screen so hides its growth
 };
 
 /// A box as it is seen over a curved earth: lowered by the least and the greatest drop within it.

@@ -227,6 +227,7 @@ struct Selector::Impl {
         cut.max_pages = kNoLimit;
         cut.only_resident = true;
         cut.growth_s = settings.growth_s;
+        cut.moved_m = settings.moved_m;
         standing.refine(views, cut, residency);
         result.refine_steps += standing.steps();
         for (const CutNode& node : standing.nodes())

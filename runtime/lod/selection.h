@@ -32,6 +32,8 @@ struct SelectionSettings {
     bool morph = true;          ///< false: discrete levels
     /// Seconds in which what came late grows out of what stood in for it: a level of heights, a texture. 0: at once.
     double growth_s = 0;
+    /// Metres that the eye has come from frame to frame lately: what races by need not grow.
+    double moved_m = 0;
 
     friend bool operator==(const SelectionSettings&, const SelectionSettings&) = default;
 };
