@@ -3,24 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-#include <new>
-
+#include "tests/common/counted_new.h"
 #include "tests/runtime/lod/selection_support.h"
-
-namespace {
-
-std::int64_t allocations = 0;
-
-}  // namespace
-
-void* operator new(std::size_t size) {
-    ++allocations;
-    if (void* memory = std::malloc(size)) return memory;
-    throw std::bad_alloc();
-}
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace scree {
 namespace {
@@ -71,11 +55,11 @@ TEST(Selection, AllocatesNothingOnceItsBuffersHaveTheirSize) {
         const std::vector<Camera> views{test::random_camera(random, terrain), test::random_camera(random, terrain)};
         const SelectionSettings settings = random_settings(random, terrain);
         for (int k = 0; k < 2; ++k) selector.select(views, settings, residency);
-        const std::int64_t before = allocations;
+        const std::int64_t before = test::allocations();
         for (int k = 0; k < 3; ++k) selector.select(views, settings, residency);
-        EXPECT_EQ(allocations, before);
+        EXPECT_EQ(test::allocations(), before);
     }
-    EXPECT_GT(allocations, 0);
+    EXPECT_GT(test::allocations(), 0);
 }
 
 TEST(Selection, OnceCompleteDoesNotDependOnWhatElseIsResident) {

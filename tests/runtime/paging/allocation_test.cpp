@@ -1,23 +1,9 @@
-// Memory that the frame loop asks for, counted: operator new is replaced in this program.
+// Memory that the frame loop asks for, counted.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-#include <new>
-
+#include "tests/common/counted_new.h"
 #include "tests/runtime/lod/memory_store.h"
 #include "tests/runtime/paging/tile_planner.h"
-
-namespace {
-thread_local std::int64_t allocations = 0;  // of this thread: the loader's do not count
-}
-
-void* operator new(std::size_t size) {
-    ++allocations;
-    if (void* memory = std::malloc(size == 0 ? 1 : size)) return memory;
-    throw std::bad_alloc();
-}
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace scree {
 namespace {
@@ -45,16 +31,16 @@ protected:
 
     // Allocations of the pager's part of a frame.
     std::int64_t frame(double i, double j, bool finish) {
-        std::int64_t before = allocations;
+        std::int64_t before = test::allocations();
         do pager_->take_arrivals(std::int64_t{1} << 40, false);
         while (finish && !pager_->idle());
-        std::int64_t counted = allocations - before;
+        std::int64_t counted = test::allocations() - before;
         const test::TilePlan& plan = planner_.plan(pager_->residency(), i, j);
         complete_ = plan.complete;
         const Pager::Wishes wishes = plan.wishes();
-        before = allocations;
+        before = test::allocations();
         pager_->request(wishes);
-        return counted + allocations - before;
+        return counted + test::allocations() - before;
     }
 
     static constexpr MemoryPlan kMemory{120, 100, 32, 0};
@@ -93,9 +79,9 @@ TEST_F(PagerMemory, AFlightThatLoadsAndEvictsComesToAllocateNothing) {
 }
 
 TEST_F(PagerMemory, TheCountCounts) {
-    const std::int64_t before = allocations;
+    const std::int64_t before = test::allocations();
     ::operator delete(::operator new(4));
-    EXPECT_EQ(allocations, before + 1);
+    EXPECT_EQ(test::allocations(), before + 1);
 }
 
 }  // namespace
