@@ -231,9 +231,10 @@ TEST(ContinuityInTime, WhatComesLateGrowsAndSettlesToThePictureWithoutGrowth) {
         // The page of a path from a root down and all under it are late, each level sooner or later than the one above
         // has grown, or at once.
         const double delay_s = world % 2 == 0 ? 0 : test::uniform_real(random, 0, 0.8);
-        const int first_late = test::uniform(random, 1, l.deepest_level);
         const auto count = static_cast<int>(terrain.tiles().size());
         const TileId chosen = terrain.tiles()[static_cast<std::size_t>(test::uniform(random, count / 2, count - 1))];
+        if (chosen.level == 0) continue;
+        const int first_late = test::uniform(random, 1, chosen.level);
         std::map<TileId, double> late;
         for (const TileId id : terrain.tiles())
             if (id.level >= first_late && ancestor_at(id, first_late) == ancestor_at(chosen, first_late))
