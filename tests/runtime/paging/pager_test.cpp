@@ -206,11 +206,6 @@ void fly(Flight& flight, test::Random& random, const SyntheticTerrain& terrain, 
     }
 }
 
-MemoryPlan tiny_plan(test::Random& random, const SyntheticTerrain& terrain) {
-    const std::int64_t roots = terrain.lattice().root_rows * terrain.lattice().root_columns;
-    return {roots + test::uniform(random, 4, 40), roots + test::uniform(random, 0, 40), test::uniform(random, 1, 6), 0};
-}
-
 TEST(Pager, RandomFlightsUnderATinyBudgetKeepEveryRuleAndSettleLikeAFreshStart) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());
@@ -219,7 +214,7 @@ TEST(Pager, RandomFlightsUnderATinyBudgetKeepEveryRuleAndSettleLikeAFreshStart) 
         SCOPED_TRACE("round " + std::to_string(round));
         const auto terrain = paging_terrain(random(), round % 4 == 3 ? test::kDeepTextures : 4);
         const MemoryStore store(terrain, round % 2 == 0 ? 0 : 200), fresh_store(terrain);
-        const MemoryPlan memory = tiny_plan(random, terrain);
+        const MemoryPlan memory = test::tiny_plan(random, terrain);
         const double detail = random_detail(random);
         Flight flight(terrain, store, memory, detail);
         for (int leg = 0; leg < 3; ++leg) {
@@ -245,7 +240,7 @@ TEST(Pager, AtRestNothingIsReadOrEvictedAnyMore) {
     for (int round = 0; round < 20; ++round) {
         const auto terrain = paging_terrain(random(), round % 4 == 3 ? test::kDeepTextures : 4);
         const MemoryStore store(terrain);
-        MemoryPlan memory = tiny_plan(random, terrain);
+        MemoryPlan memory = test::tiny_plan(random, terrain);
         const bool prefetch = round % 2 == 1;
         if (prefetch) memory.staging_slots = 16;
         Flight flight(terrain, store, memory, random_detail(random), 3, prefetch);
@@ -287,7 +282,7 @@ TEST(Pager, DamagedTilesAreSaidOnceAndTheirParentsStandIn) {
         for (const TileId id : terrain.textures())
             if (id.level > 0 && test::uniform(random, 0, 9) == 0)
                 store.damage(TileKind::texture, id, static_cast<Damage>(test::uniform(random, 0, 2)));
-        Flight flight(terrain, store, tiny_plan(random, terrain), 0.3);
+        Flight flight(terrain, store, test::tiny_plan(random, terrain), 0.3);
         for (int leg = 0; leg < 3; ++leg) {
             fly(flight, random, terrain, 60);
             if (HasFatalFailure()) return;
@@ -357,7 +352,7 @@ TEST(Pager, EndsCleanlyInTheMiddleOfAFlight) {
     const auto terrain = paging_terrain(6, 4);
     const MemoryStore store(terrain, 300);
     for (int round = 0; round < 20; ++round) {
-        Flight flight(terrain, store, tiny_plan(random, terrain), 0.1, 4);
+        Flight flight(terrain, store, test::tiny_plan(random, terrain), 0.1, 4);
         const Point eye = random_point(random, terrain);
         for (int k = 0; k < 3; ++k) flight.frame(eye, 1 << 20, false);
     }

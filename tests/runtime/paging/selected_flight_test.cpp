@@ -7,6 +7,7 @@
 #include "runtime/lod/selection.h"
 #include "runtime/paging/pager.h"
 #include "tests/runtime/lod/memory_store.h"
+#include "tests/runtime/paging/tile_planner.h"
 
 namespace scree {
 namespace {
@@ -118,11 +119,6 @@ void fly(Flight& flight, test::Random& random, const SyntheticTerrain& terrain, 
     }
 }
 
-MemoryPlan tiny_plan(test::Random& random, const SyntheticTerrain& terrain) {
-    const std::int64_t roots = terrain.lattice().root_rows * terrain.lattice().root_columns;
-    return {roots + test::uniform(random, 4, 40), roots + test::uniform(random, 0, 40), test::uniform(random, 1, 6), 0};
-}
-
 TEST(SelectedFlight, UnderATinyBudgetHasNoHolesAndSettlesLikeAFreshStart) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());
@@ -131,7 +127,7 @@ TEST(SelectedFlight, UnderATinyBudgetHasNoHolesAndSettlesLikeAFreshStart) {
         SCOPED_TRACE("round " + std::to_string(round));
         const auto terrain = flight_terrain(random(), round % 4 == 3 ? test::kDeepTextures : 4);
         const MemoryStore store(terrain, round % 2 == 0 ? 0 : 200), fresh_store(terrain);
-        const MemoryPlan memory = tiny_plan(random, terrain);
+        const MemoryPlan memory = test::tiny_plan(random, terrain);
         const double tau = std::exp(test::uniform_real(random, -1, 3));
         Flight flight(terrain, store, memory, tau);
         for (int leg = 0; leg < 3; ++leg) {
@@ -156,7 +152,7 @@ TEST(SelectedFlight, AtRestNothingIsReadOrEvictedAnyMore) {
     for (int round = 0; round < 16; ++round) {
         const auto terrain = flight_terrain(random(), round % 4 == 3 ? test::kDeepTextures : 4);
         const MemoryStore store(terrain);
-        Flight flight(terrain, store, tiny_plan(random, terrain), std::exp(test::uniform_real(random, -2, 3)));
+        Flight flight(terrain, store, test::tiny_plan(random, terrain), std::exp(test::uniform_real(random, -2, 3)));
         fly(flight, random, terrain, 20);
         const Camera camera = test::random_camera(random, terrain);
         flight.settle(camera);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/dataset.h"
+#include "runtime/paging/memory_plan.h"
 #include "runtime/paging/pager.h"
 
 namespace scree::test {
@@ -116,5 +117,11 @@ private:
     std::vector<Node> nodes_;
     TilePlan plan_;
 };
+
+/// A few slots more than the roots need.
+inline MemoryPlan tiny_plan(Random& random, const SyntheticTerrain& terrain) {
+    const std::int64_t roots = terrain.lattice().root_rows * terrain.lattice().root_columns;
+    return {roots + uniform(random, 4, 40), roots + uniform(random, 0, 40), uniform(random, 1, 6), 0};
+}
 
 }  // namespace scree::test
