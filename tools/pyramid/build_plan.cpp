@@ -46,10 +46,10 @@ Result<void> plan_imagery(const BuildOptions& o, BuildPlan& plan) {
                                        where ? "does" : "does not"));
     if (!where) {
         Georeference covering;  // the image covers the samples' extent edge to edge
-        covering.step_x = static_cast<double>(lattice.cells_x) * lattice.spacing_m / static_cast<double>(info.width);
-        covering.step_y = -static_cast<double>(lattice.cells_y) * lattice.spacing_m / static_cast<double>(info.height);
-        covering.first_x = lattice.origin_x_m + covering.step_x / 2;
-        covering.first_y = lattice.origin_y_m + covering.step_y / 2;
+        covering.column_x = static_cast<double>(lattice.cells_x) * lattice.spacing_m / static_cast<double>(info.width);
+        covering.row_y = -static_cast<double>(lattice.cells_y) * lattice.spacing_m / static_cast<double>(info.height);
+        covering.first_x = lattice.origin_x_m + covering.column_x / 2;
+        covering.first_y = lattice.origin_y_m + covering.row_y / 2;
         plan.imagery_where = covering;
         return {};
     }
@@ -57,9 +57,9 @@ Result<void> plan_imagery(const BuildOptions& o, BuildPlan& plan) {
     if (!where->crs.empty() && !dem_where->crs.empty() && where->crs != dem_where->crs)
         return input_error(fmt::format("{} is in {}, {} in {}: both must be in one CRS until warping exists",
                                        *o.imagery, where->crs, o.dem, dem_where->crs));
-    const double west = where->first_x - where->step_x / 2, north = where->first_y - where->step_y / 2;
-    const double east = west + static_cast<double>(info.width) * where->step_x;
-    const double south = north + static_cast<double>(info.height) * where->step_y;
+    const double west = where->first_x - where->column_x / 2, north = where->first_y - where->row_y / 2;
+    const double east = west + static_cast<double>(info.width) * where->column_x;
+    const double south = north + static_cast<double>(info.height) * where->row_y;
     const auto cells_x = static_cast<double>(lattice.cells_x), cells_y = static_cast<double>(lattice.cells_y);
     if (east <= lattice.x_m(0) || west >= lattice.x_m(cells_x) || north <= lattice.y_m(cells_y) ||
         south >= lattice.y_m(0))
@@ -153,7 +153,7 @@ Result<BuildPlan> plan_build(const BuildOptions& o) {
         if (!imagery) return imagery.error();
         plan.imagery = std::move(*imagery);
         if (auto ok = plan_imagery(o, plan); !ok) return ok.error();
-        source_texel = std::min(plan.imagery_where.step_x, -plan.imagery_where.step_y);
+        source_texel = std::min(plan.imagery_where.column_x, -plan.imagery_where.row_y);
         d.has_imagery = true;
         d.sources.push_back(source_record(*o.imagery, "imagery", plan.imagery->info()));
     }

@@ -25,10 +25,10 @@ ImageryRows::ImageryRows(ImageSource& source, const Georeference& where, const T
     : source_(source),
       width_(source.info().width),
       height_(source.info().height),
-      row_first_((grid.first_y - where.first_y) / where.step_y),
-      row_step_(-grid.step / where.step_y),
+      row_first_((grid.first_y - where.first_y) / where.row_y),
+      row_step_(-grid.step / where.row_y),
       columns_(static_cast<std::size_t>(grid.width)) {
-    const double first = (grid.first_x - where.first_x) / where.step_x, step = grid.step / where.step_x;
+    const double first = (grid.first_x - where.first_x) / where.column_x, step = grid.step / where.column_x;
     for (std::int64_t c = 0; c < grid.width; ++c) {
         std::int64_t left = -1;
         int weight = 0;

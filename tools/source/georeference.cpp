@@ -121,15 +121,18 @@ void read_crs(GTIF* keys, GeotiffTags& tags) {
 }
 
 Result<void> check_steps(const Georeference& reference, const std::string& path, const char* where) {
-    for (const double value : {reference.first_x, reference.first_y, reference.step_x, reference.step_y}) {
+    for (const double value : {reference.first_x, reference.first_y, reference.column_x, reference.column_y,
+                               reference.row_x, reference.row_y}) {
         if (!std::isfinite(value))
             return Error{ErrorCode::input,
                          fmt::format("{}: {} holds {}, so the samples lie nowhere", path, where, value)};
     }
-    if (!reference.rotated && (reference.step_x == 0 || reference.step_y == 0))
-        return Error{ErrorCode::input,
-                     fmt::format("{}: {} gives a step of {} x {}, so all samples would lie on one line", path, where,
-                                 reference.step_x, reference.step_y)};
+    const double area = reference.column_x * reference.row_y - reference.column_y * reference.row_x;
+    if (area == 0 || !std::isfinite(area))
+        return Error{
+            ErrorCode::input,
+            fmt::format("{}: {} gives steps of ({}, {}) and ({}, {}), so all samples would lie on one line", path,
+                        where, reference.column_x, reference.column_y, reference.row_x, reference.row_y)};
     return {};
 }
 
@@ -139,10 +142,10 @@ struct Affine {
 };
 
 void apply(const Affine& t, double centre, Georeference& reference) {
-    reference.rotated =
-        !(std::abs(t.b) <= kNegligibleRotation * std::abs(t.a) && std::abs(t.d) <= kNegligibleRotation * std::abs(t.e));
-    reference.step_x = t.a;
-    reference.step_y = t.e;
+    reference.column_x = t.a;
+    reference.row_x = t.b;
+    reference.column_y = t.d;
+    reference.row_y = t.e;
     reference.first_x = t.c + centre * (t.a + t.b);
     reference.first_y = t.f + centre * (t.d + t.e);
 }
@@ -174,11 +177,6 @@ Result<void> read_transform(TIFF* file, const std::string& path, GeotiffTags& ta
         apply({matrix[0], matrix[1], matrix[3], matrix[4], matrix[5], matrix[7]}, centre, tags.reference);
         tags.has_transform = true;
         return check_steps(tags.reference, path, "its ModelTransformation");
-    }
-    if (has_tie && tie_count >= 2 * kTiePointDoubles) {
-        // Ground control points place the image, but not as a lattice; that is what `rotated` says.
-        tags.reference.rotated = true;
-        tags.has_transform = true;
     }
     return {};
 }
@@ -257,6 +255,11 @@ Result<Georeference> parse_world_file(const std::string& path) {
 
 }  // namespace
 
+bool Georeference::axis_aligned() const {
+    return std::abs(row_x) <= kNegligibleRotation * std::abs(column_x) &&
+           std::abs(column_y) <= kNegligibleRotation * std::abs(row_y);
+}
+
 Result<std::optional<Georeference>> read_geotiff(const std::string& path) {
     try {
         Result<GeotiffTags> tags = read_geotiff_tags(path);
@@ -295,9 +298,10 @@ Result<std::optional<Georeference>> read_georeference(const std::string& image_p
         Georeference merged = std::move(tags->reference);
         merged.first_x = placed.first_x;
         merged.first_y = placed.first_y;
-        merged.step_x = placed.step_x;
-        merged.step_y = placed.step_y;
-        merged.rotated = placed.rotated;
+        merged.column_x = placed.column_x;
+        merged.column_y = placed.column_y;
+        merged.row_x = placed.row_x;
+        merged.row_y = placed.row_y;
         return std::optional<Georeference>(std::move(merged));
     } catch (const std::exception& problem) {
         return Error{ErrorCode::input,

@@ -10,17 +10,24 @@
 namespace scree {
 
 struct Georeference {
-    double first_x = 0;    ///< x of the centre of sample (column 0, row 0), CRS units
-    double first_y = 0;    ///< y of the same
-    double step_x = 1;     ///< x from one column to the next
-    double step_y = -1;    ///< y from one row to the next; negative in a north-up file
-    bool rotated = false;  ///< ModelTransformation or world file with rotation terms: steps are meaningless then
-    bool raster_is_point = false;  ///< GTRasterTypeGeoKey was PixelIsPoint
-    bool geographic = false;       ///< degrees, not metres
-    std::string crs;               ///< "EPSG:n", or empty when the file names none (a world file)
-    std::string crs_name;          ///< citation text for people, may be empty
-    std::string vertical_datum;    ///< "EPSG:n" of the vertical CRS/datum key when present, else empty
-    double linear_unit_m = 1;      ///< metres per CRS unit (projected)
+    /// The centre of sample (column c, row r) stands at x = first_x + c * column_x + r * row_x,
+    /// y = first_y + c * column_y + r * row_y, in units of the CRS.
+    double first_x = 0, first_y = 0;
+    double column_x = 1, column_y = 0;  ///< from one column to the next
+    double row_x = 0, row_y = -1;       ///< from one row to the next; row_y is negative in a north-up file
+    bool raster_is_point = false;       ///< samples are points (GTRasterTypeGeoKey PixelIsPoint, .hgt, DTED...)
+    std::string crs;                    ///< what Crs::parse reads: "EPSG:n", WKT or a PROJ string; empty: not said
+    std::string crs_name;               ///< citation text for people, may be empty
+    std::string vertical_datum;         ///< "EPSG:n" of the vertical CRS/datum key when present, else empty
+    bool geographic = false;            ///< going: Crs says it
+    double linear_unit_m = 1;           ///< going: Crs says it
+    double height_unit_m = 0;           ///< metres per unit of the heights where the file says so, else 0
+
+    double x(double column, double row) const { return first_x + column * column_x + row * row_x; }
+    double y(double column, double row) const { return first_y + column * column_y + row * row_y; }
+    /// Rows run along x and columns along y, in either direction: no rotation or shear worth a thousandth of a sample
+    /// over 2^20 of them.
+    bool axis_aligned() const;
 };
 
 /// Reads GeoTIFF tags of a TIFF file; nullopt when it has none. Errors (ErrorCode::input) only for absurd values

@@ -51,9 +51,9 @@ Result<HeightPlace> place_heights(const std::string& path, const ImageSource& de
     if (reading.spacing_m)
         return usage_error(
             fmt::format("--spacing {}: {} carries its own georeference ({} m); the option is for files without",
-                        *reading.spacing_m, path, where.step_x));
+                        *reading.spacing_m, path, where.column_x));
     if (auto ok = check_usable(path, where); !ok) return ok.error();
-    return HeightPlace{where.first_x, where.first_y, where.step_x, -where.step_y};
+    return HeightPlace{where.first_x, where.first_y, where.column_x, -where.row_y};
 }
 
 Result<void> check_usable(const std::string& path, const Georeference& where) {
@@ -62,21 +62,21 @@ Result<void> check_usable(const std::string& path, const Georeference& where) {
             fmt::format("{}: coordinates are degrees ({}); heights in degrees cannot be built until warping "
                         "exists: reproject to a metric CRS such as UTM first",
                         path, where.crs.empty() ? "geographic CRS" : where.crs));
-    if (where.rotated)
+    if (!where.axis_aligned())
         return input_error(fmt::format(
             "{}: the raster is rotated against its CRS; this needs warping, which does not exist yet", path));
-    if (where.step_y > 0 || where.step_x < 0)
+    if (where.row_y > 0 || where.column_x < 0)
         return input_error(
             fmt::format("{}: rows do not run from north to south (steps {}, {}); this needs warping, which does "
                         "not exist yet",
-                        path, where.step_x, where.step_y));
+                        path, where.column_x, where.row_y));
     if (std::abs(where.linear_unit_m - 1) > 1e-9)
         return input_error(fmt::format("{}: CRS units of {} m; only metres can be built until warping exists", path,
                                        where.linear_unit_m));
-    if (std::abs(where.step_x + where.step_y) > kSquareTolerance * where.step_x)
+    if (std::abs(where.column_x + where.row_y) > kSquareTolerance * where.column_x)
         return input_error(
             fmt::format("{}: cells of {} x {} m are not square; this needs warping, which does not exist yet", path,
-                        where.step_x, -where.step_y));
+                        where.column_x, -where.row_y));
     return {};
 }
 

@@ -11,6 +11,7 @@
 #include <string>
 
 #include "common/result.h"
+#include "tools/source/colour_reading.h"
 #include "tools/source/georeference.h"
 
 namespace scree {
@@ -34,7 +35,8 @@ struct ImageInfo {
 
 struct OpenOptions {
     std::int64_t max_unit_bytes =
-        INT64_MAX;  ///< a strip, row of tiles or frame above this is refused, naming the size needed
+        INT64_MAX;          ///< a strip, row of tiles or frame above this is refused, naming the size needed
+    ColourReading colours{};  ///< for read_rgba8
 };
 
 class ImageSource {

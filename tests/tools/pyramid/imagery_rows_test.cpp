@@ -56,8 +56,8 @@ Georeference at(double first_x, double first_y, double step) {
     Georeference where;
     where.first_x = first_x;
     where.first_y = first_y;
-    where.step_x = step;
-    where.step_y = -step;
+    where.column_x = step;
+    where.row_y = -step;
     return where;
 }
 

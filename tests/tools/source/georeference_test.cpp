@@ -42,10 +42,10 @@ TEST(Georeference, PixelIsAreaLiesHalfAPixelInsideItsTiePoint) {
     const Georeference g = read_placed(directory, placed());
     EXPECT_EQ(g.first_x, 1015);
     EXPECT_EQ(g.first_y, 4990);
-    EXPECT_EQ(g.step_x, 30);
-    EXPECT_EQ(g.step_y, -20);
+    EXPECT_EQ(g.column_x, 30);
+    EXPECT_EQ(g.row_y, -20);
     EXPECT_FALSE(g.raster_is_point);
-    EXPECT_FALSE(g.rotated);
+    EXPECT_TRUE(g.axis_aligned());
 }
 
 TEST(Georeference, PixelIsPointLiesOnItsTiePoint) {
@@ -74,10 +74,10 @@ TEST(Georeference, AnUnrotatedModelTransformationIsAsGoodAsAScale) {
     tiff.tie_points.clear();
     tiff.matrix = {30, 0, 0, 1000, 0, -20, 0, 5000, 0, 0, 0, 0, 0, 0, 0, 1};
     const Georeference g = read_placed(directory, tiff);
-    EXPECT_FALSE(g.rotated);
+    EXPECT_TRUE(g.axis_aligned());
     EXPECT_EQ(g.first_x, 1015);
     EXPECT_EQ(g.first_y, 4990);
-    EXPECT_EQ(g.step_y, -20);
+    EXPECT_EQ(g.row_y, -20);
 }
 
 TEST(Georeference, ARotatedModelTransformationIsFlagged) {
@@ -86,7 +86,7 @@ TEST(Georeference, ARotatedModelTransformationIsFlagged) {
     tiff.scale.clear();
     tiff.tie_points.clear();
     tiff.matrix = {30, 5, 0, 1000, 5, -20, 0, 5000, 0, 0, 0, 0, 0, 0, 0, 1};
-    EXPECT_TRUE(read_placed(directory, tiff).rotated);
+    EXPECT_FALSE(read_placed(directory, tiff).axis_aligned());
 }
 
 TEST(Georeference, ProjectedCodeVerticalCodeAndCitationAreRead) {
@@ -161,9 +161,9 @@ TEST(WorldFile, ItsLastTwoNumbersAreTheFirstSample) {
         ASSERT_TRUE(read.ok() && read->has_value()) << name;
         EXPECT_EQ((*read)->first_x, 400001.25);
         EXPECT_EQ((*read)->first_y, 5299998.75);
-        EXPECT_EQ((*read)->step_x, 2.5);
-        EXPECT_EQ((*read)->step_y, -2.5);
-        EXPECT_FALSE((*read)->rotated);
+        EXPECT_EQ((*read)->column_x, 2.5);
+        EXPECT_EQ((*read)->row_y, -2.5);
+        EXPECT_TRUE((*read)->axis_aligned());
         EXPECT_EQ((*read)->crs, "");
         std::filesystem::remove(world);
     }
@@ -174,7 +174,7 @@ TEST(WorldFile, RotationTermsAreFlagged) {
     directory.write("a.pgw", "2 0.5 0.5 -2 0 0");
     const auto read = read_world_file(directory.path("a.png"));
     ASSERT_TRUE(read.ok() && read->has_value());
-    EXPECT_TRUE((*read)->rotated);
+    EXPECT_FALSE((*read)->axis_aligned());
 }
 
 TEST(WorldFile, WordsCommasAndMissingNumbersAreErrors) {
@@ -201,7 +201,7 @@ TEST(WorldFile, ATiffWithKeysButNoPlaceTakesItsPlaceFromTheWorldFile) {
     ASSERT_TRUE(read.ok() && read->has_value());
     EXPECT_EQ((*read)->crs, "EPSG:32633");
     EXPECT_EQ((*read)->first_x, 500);
-    EXPECT_EQ((*read)->step_y, -10);
+    EXPECT_EQ((*read)->row_y, -10);
 }
 
 TEST(NumberText, OnlyWholeNumbersOfADecimalPointAreTaken) {
@@ -227,7 +227,7 @@ TEST(GeoreferenceOfRealFiles, ARotatedTransformationIsFlagged) {
     SCREE_DATA_OR_SKIP(path, "formats/geomatrix.tif");
     const auto read = read_geotiff(path);
     ASSERT_TRUE(read.ok() && read->has_value());
-    EXPECT_TRUE((*read)->rotated);
+    EXPECT_FALSE((*read)->axis_aligned());
     EXPECT_EQ((*read)->crs, "EPSG:32611");
 }
 
@@ -236,8 +236,8 @@ TEST(GeoreferenceOfRealFiles, TaipeiIsInTwd97) {
     const auto read = read_geotiff(path);
     ASSERT_TRUE(read.ok() && read->has_value());
     EXPECT_EQ((*read)->crs, "EPSG:3826");
-    EXPECT_EQ((*read)->step_x, 40);
-    EXPECT_EQ((*read)->step_y, -40);
+    EXPECT_EQ((*read)->column_x, 40);
+    EXPECT_EQ((*read)->row_y, -40);
 }
 
 }  // namespace

@@ -77,11 +77,11 @@ TEST(Synth, TheFilesSayWhereTheyLieAndCoincide) {
     EXPECT_EQ(heights.crs, "EPSG:32633");
     EXPECT_EQ(colours.crs, "EPSG:32633");
     EXPECT_EQ(heights.first_x, 400000);
-    EXPECT_EQ(heights.step_y, -10);
+    EXPECT_EQ(heights.row_y, -10);
     // From the outer edge of the first pixel to that of the last: the extent of the samples.
-    EXPECT_DOUBLE_EQ(colours.first_x - colours.step_x / 2, heights.first_x);
-    EXPECT_DOUBLE_EQ(colours.first_y - colours.step_y / 2, heights.first_y);
-    EXPECT_DOUBLE_EQ(colours.step_x * 192 * 3, heights.step_x * 192);
+    EXPECT_DOUBLE_EQ(colours.first_x - colours.column_x / 2, heights.first_x);
+    EXPECT_DOUBLE_EQ(colours.first_y - colours.row_y / 2, heights.first_y);
+    EXPECT_DOUBLE_EQ(colours.column_x * 192 * 3, heights.column_x * 192);
 }
 
 TEST(Synth, TheReportHoldsTheRangeOfTheHeights) {

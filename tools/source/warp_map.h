@@ -1,0 +1,62 @@
+// Where the points of a square north-up grid fall in another raster: CRS transform and affine placement in one, by
+// interpolation with a bound. Work goes by fixed chunks of the grid, so the answer for a point does not depend on who
+// asks for what; immutable after make(), every call may come from any thread.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "common/result.h"
+#include "tools/source/crs.h"
+#include "tools/source/georeference.h"
+
+namespace scree {
+
+/// Point (i, j) stands at x = x_m + i * step_m, y = y_m - j * step_m.
+struct TargetGrid {
+    double x_m = 0, y_m = 0;
+    double step_m = 1;
+};
+
+/// Greatest distance in source samples between the interpolated and PROJ's own position.
+inline constexpr double kWarpBoundSamples = 1.0 / 64;
+
+struct SourcePoints {
+    std::span<double> column, row;  ///< fractional sample coordinates (0, 0 = centre of the first sample); NaN: nowhere
+};
+
+class WarpMap {
+public:
+    /// Points per chunk side; chunks begin at multiples of it.
+    static constexpr std::int64_t kChunk = 64;
+
+    static Result<WarpMap> make(const TargetGrid& grid, const Crs& grid_crs, const Georeference& source,
+                                const Crs& source_crs);
+
+    /// The points [i0, i0 + columns) x [j0, j0 + rows), row-major. Exact (to rounding) where no transform is needed;
+    /// and then column depends on i alone and row on j alone if the source is axis-aligned.
+    void map(std::int64_t i0, std::int64_t j0, std::int64_t columns, std::int64_t rows, SourcePoints out) const;
+
+    /// Source samples from one grid point to the next around (i, j), along the source's columns and rows: above 1 the
+    /// grid shrinks the source.
+    struct Shrink {
+        double columns = 1, rows = 1;
+    };
+    Shrink shrink_at(std::int64_t i, std::int64_t j) const;
+
+    /// The greatest distance met between interpolated and true positions so far checked by make() on a sample of
+    /// chunks, source samples; at most kWarpBoundSamples.
+    bool exact() const;  ///< no CRS transform: an affine map
+
+    WarpMap(WarpMap&&) noexcept;
+    WarpMap& operator=(WarpMap&&) noexcept;
+    ~WarpMap();
+
+private:
+    struct Impl;
+    explicit WarpMap(std::unique_ptr<Impl> impl);
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace scree
