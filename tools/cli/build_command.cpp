@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "common/report.h"
@@ -12,12 +13,19 @@
 namespace scree {
 namespace {
 
+const std::map<std::string, Kernel> kKernels = {
+    {"nearest", Kernel::nearest}, {"bilinear", Kernel::bilinear}, {"cubic", Kernel::cubic}};
+
 void print_plan(const BuildPlan& plan) {
     const Dataset& d = plan.dataset;
     const Lattice& l = d.lattice;
     note("lattice: {} x {} cells of {} m, {} levels, {} x {} root{}{}\n", l.cells_x, l.cells_y, l.spacing_m,
          l.deepest_level + 1, l.root_rows, l.root_columns, l.root_rows * l.root_columns == 1 ? "" : "s",
          d.crs.empty() ? "" : ", " + d.crs);
+    const MosaicPlan& m = plan.mosaic;
+    if (!m.crs_reason.empty()) note("CRS: {}\n", m.crs_reason);
+    if (!m.heights_copied) note("heights are resampled: their samples are no square grid of {}\n", d.crs);
+    for (const std::string& warning : m.warnings) note("warning: {}\n", warning);
     note("textures: {} levels, {} m a texel; memory: about {} MiB\n", d.texture_deepest_level + 1,
          d.texel_m(d.texture_deepest_level), plan.memory_bytes >> 20);
 }
@@ -27,14 +35,34 @@ void print_plan(const BuildPlan& plan) {
 int run_build(int argc, char** argv) {
     CLI::App app{"Cuts a DEM and an image into a pyramid of height and DXT1 texture tiles in one file.", "scree build"};
     BuildOptions options;
-    std::string memory = "256M", json, imagery;
-    std::vector<std::string> dems, images;
+    std::string memory = "256M", json;
     bool dry_run = false;
-    app.add_option("DEM", dems, "Heights: GeoTIFF or any image; channel 1")->required()->expected(1, -1);
-    app.add_option("--imagery", images, "Colour image in the same CRS; its extent and resolution may differ")
+    std::vector<double> stretch;
+    app.add_option("DEM", options.dems,
+                   "Heights: files and folders; where several have a value the later one lies on top")
+        ->required()
+        ->expected(1, -1);
+    app.add_option("--imagery", options.images, "Colour images: files and folders, in any CRS; later ones lie on top")
         ->expected(1, -1);
     app.add_option("-o,--output", options.out, "The store to write")->required();
     add_height_options(app, options);
+    app.add_option(
+        "--crs", options.crs,
+        "CRS of the store, metric: EPSG:n, WKT or a PROJ string; default: the DEM's own where it is metric, else "
+        "chosen by its place");
+    app.add_option("--assume-crs", options.assume_crs, "CRS of files that name none");
+    app.add_flag("--assume-same-datum", options.assume_same_datum, "Take heights above different datums as they are");
+    app.add_option("--resampling", options.kernel, "Where samples are not lattice points: nearest, bilinear or cubic")
+        ->transform(CLI::CheckedTransformer(kKernels, CLI::ignore_case))
+        ->default_str("bilinear");
+    app.add_option("--bands", options.colours.bands, "Bands shown as red, green, blue, or as grey: 3,2,1")
+        ->delimiter(',');
+    app.add_option("--stretch", stretch,
+                   "MIN,MAX: values shown black and white; default for 16-bit and float images: percentiles 2 and 98")
+        ->delimiter(',')
+        ->expected(2);
+    app.add_option("--imagery-nodata", options.colours.nodata,
+                   "A pixel value that means nothing, besides the file's own");
     app.add_option("--tile-size", options.tile_size,
                    "Samples along a height tile, 2^n + 1: larger means fewer, coarser choices")
         ->capture_default_str();
@@ -54,11 +82,7 @@ int run_build(int argc, char** argv) {
     } catch (const CLI::ParseError& error) {
         return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorCode::usage);
     }
-    if (dems.size() != 1 || images.size() > 1)
-        return report_error("scree build",
-                            {ErrorCode::usage, "one DEM and at most one image for now; mosaics come later"});
-    options.dem = dems.front();
-    if (!images.empty()) options.imagery = images.front();
+    if (!stretch.empty()) options.colours.stretch = Stretch{stretch[0], stretch[1]};
     const auto bytes = parse_bytes(memory);
     if (!bytes)
         return report_error("scree build",

@@ -1,0 +1,410 @@
+#include "tools/mosaic/stack.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <type_traits>
+
+namespace scree {
+namespace {
+
+constexpr std::int64_t kBandRows = RasterSpool<float>::kBlock;
+constexpr std::int64_t kMaxWindow = std::int64_t{1} << 18;  // samples held to make a rectangle; larger ones are halved
+constexpr double kOnGrid = 1e-3;                            // samples
+constexpr double kUncovered = -std::numeric_limits<double>::infinity();
+constexpr double kVoid = std::numeric_limits<double>::quiet_NaN();
+constexpr std::uint32_t kOpaque = 128;
+
+struct Rectangle {
+    std::int64_t i = 0, j = 0, columns = 0, rows = 0;
+    std::int64_t count() const { return columns * rows; }
+};
+
+// One layer's raster with the way from grid points into it.
+template <class T>
+struct SpooledLayer {
+    Layer layer;
+    WarpMap map;
+    std::unique_ptr<RasterSpool<T>> spool;
+    Kernel kernel;
+};
+
+Error interrupted() { return {ErrorCode::interrupted, "stopped; nothing was written"}; }
+
+template <class T>
+using Resampled = std::conditional_t<std::is_floating_point_v<T>, double, std::uint32_t>;
+
+// What the kernel and the margins of rounding may read around the points' own samples.
+struct Window {
+    std::int64_t column = 0, row = 0, columns = 0, rows = 0;
+    std::int64_t count() const { return columns * rows; }
+};
+
+std::optional<Window> window_of(const SourcePoints& points, const Layer& layer, const ResampleRule& rule) {
+    double west = std::numeric_limits<double>::infinity(), east = -west, north = west, south = -west;
+    for (std::size_t k = 0; k < points.column.size(); ++k) {
+        const double c = points.column[k], r = points.row[k];
+        if (!std::isfinite(c) || !std::isfinite(r)) continue;
+        west = std::min(west, c);
+        east = std::max(east, c);
+        north = std::min(north, r);
+        south = std::max(south, r);
+    }
+    const auto columns = static_cast<double>(layer.columns), rows = static_cast<double>(layer.rows);
+    west = std::max(west, -1.0);
+    north = std::max(north, -1.0);
+    east = std::min(east, columns);
+    south = std::min(south, rows);
+    if (!(west <= east && north <= south)) return std::nullopt;
+    const std::int64_t reach_x = kernel_reach(rule.kernel, rule.shrink.columns) + 1;
+    const std::int64_t reach_y = kernel_reach(rule.kernel, rule.shrink.rows) + 1;
+    Window w;
+    w.column = static_cast<std::int64_t>(std::floor(west)) - reach_x;
+    w.row = static_cast<std::int64_t>(std::floor(north)) - reach_y;
+    w.columns = static_cast<std::int64_t>(std::ceil(east)) + reach_x + 1 - w.column;
+    w.rows = static_cast<std::int64_t>(std::ceil(south)) + reach_y + 1 - w.row;
+    return w;
+}
+
+// Void or uncovered, for points that got no height: what the nearest sample is.
+double kind_of_nothing(const std::vector<double>& window, const Window& w, double column, double row) {
+    if (!std::isfinite(column) || !std::isfinite(row)) return kUncovered;
+    const auto c = static_cast<std::int64_t>(std::nearbyint(column)) - w.column;
+    const auto r = static_cast<std::int64_t>(std::nearbyint(row)) - w.row;
+    if (c < 0 || r < 0 || c >= w.columns || r >= w.rows) return kUncovered;
+    return window[static_cast<std::size_t>(r * w.columns + c)];
+}
+
+bool is_void_or_value(double v) { return v != kUncovered; }
+
+std::int64_t chunk_of(std::int64_t i) {
+    return i >= 0 ? i / WarpMap::kChunk : -((WarpMap::kChunk - 1 - i) / WarpMap::kChunk);
+}
+std::int64_t chunk_middle(std::int64_t i) { return chunk_of(i) * WarpMap::kChunk + WarpMap::kChunk / 2; }
+
+// The layer's values at points that have none yet. The area lies within one chunk of the map.
+template <class T>
+class LayerSampler {
+public:
+    using Value = Resampled<T>;
+
+    LayerSampler(const SpooledLayer<T>& layer, const Rectangle& area) : layer_(layer) {
+        const auto count = static_cast<std::size_t>(area.count());
+        columns_.resize(count);
+        rows_.resize(count);
+        points_ = {columns_, rows_};
+        layer.map.map(area.i, area.j, area.columns, area.rows, points_);
+        // One footprint a chunk of the map: what is asked for does not change what is given.
+        rule_ = {layer.kernel, layer.map.shrink_at(chunk_middle(area.i), chunk_middle(area.j)),
+                 layer.layer.half_sample_rim, layer.layer.columns, layer.layer.rows};
+    }
+
+    std::optional<Window> window() const { return window_of(points_, layer_.layer, rule_); }
+
+    Result<void> overlay(const Window& w, std::span<Value> out) {
+        const auto count = static_cast<std::size_t>(w.count());
+        std::vector<T> stored(count);
+        if (auto ok = layer_.spool->read(w.column, w.row, w.columns, w.rows, stored); !ok) return ok;
+        std::vector<Value> values(stored.begin(), stored.end());
+        std::vector<Value> fresh(out.size());
+        if constexpr (std::is_floating_point_v<T>) {
+            std::vector<double> finite = values;
+            for (double& v : finite)
+                if (!std::isfinite(v)) v = kVoid;
+            resample_heights({w.column, w.row, w.columns, w.rows, finite}, points_, rule_, fresh);
+            for (std::size_t k = 0; k < out.size(); ++k) {
+                if (std::isfinite(out[k])) continue;
+                const double v = std::isfinite(fresh[k]) ? fresh[k] : kind_of_nothing(values, w, columns_[k], rows_[k]);
+                if (std::isfinite(fresh[k]))
+                    out[k] = v;
+                else if (is_void_or_value(v))
+                    out[k] = kVoid;
+            }
+        } else {
+            resample_colours({w.column, w.row, w.columns, w.rows, values}, points_, rule_, fresh);
+            for (std::size_t k = 0; k < out.size(); ++k)
+                if (out[k] == 0 && fresh[k] >> 24 >= kOpaque) out[k] = fresh[k] | 0xFF000000U;
+        }
+        return {};
+    }
+
+private:
+    const SpooledLayer<T>& layer_;
+    std::vector<double> columns_, rows_;
+    SourcePoints points_;
+    ResampleRule rule_;
+};
+
+template <class T>
+bool complete(std::span<const Resampled<T>> out) {
+    if constexpr (std::is_floating_point_v<T>)
+        return std::all_of(out.begin(), out.end(), [](double v) { return std::isfinite(v); });
+    else
+        return std::all_of(out.begin(), out.end(), [](std::uint32_t v) { return v != 0; });
+}
+
+template <class V>
+void copy_part(std::span<const V> from, const Rectangle& from_area, std::span<V> to, const Rectangle& to_area,
+               const Rectangle& part) {
+    for (std::int64_t j = part.j; j < part.j + part.rows; ++j)
+        std::copy_n(from.begin() + (j - from_area.j) * from_area.columns + (part.i - from_area.i), part.columns,
+                    to.begin() + (j - to_area.j) * to_area.columns + (part.i - to_area.i));
+}
+
+template <class T>
+Result<void> overlay_layer(const SpooledLayer<T>& layer, const Rectangle& area, std::span<Resampled<T>> out) {
+    LayerSampler<T> sampler(layer, area);
+    const auto window = sampler.window();
+    if (!window) return {};
+    if (window->count() <= kMaxWindow || area.count() == 1) return sampler.overlay(*window, out);
+    // Far more samples than points: quarter by quarter.
+    Rectangle first = area, second = area;
+    if (area.columns >= area.rows) {
+        first.columns = area.columns / 2;
+        second.columns = area.columns - first.columns;
+        second.i += first.columns;
+    } else {
+        first.rows = area.rows / 2;
+        second.rows = area.rows - first.rows;
+        second.j += first.rows;
+    }
+    for (const Rectangle& part : {first, second}) {
+        std::vector<Resampled<T>> values(static_cast<std::size_t>(part.count()));
+        copy_part<Resampled<T>>(out, area, values, part, part);
+        if (auto ok = overlay_layer<T>(layer, part, values); !ok) return ok;
+        copy_part<Resampled<T>>(values, part, out, area, part);
+    }
+    return {};
+}
+
+template <class T>
+Result<void> sample_chunk(const std::vector<SpooledLayer<T>>& layers, const Rectangle& area,
+                          std::span<Resampled<T>> out) {
+    if constexpr (std::is_floating_point_v<T>)
+        std::fill(out.begin(), out.end(), kUncovered);
+    else
+        std::fill(out.begin(), out.end(), 0U);
+    for (auto layer = layers.rbegin(); layer != layers.rend(); ++layer) {
+        if (auto ok = overlay_layer<T>(*layer, area, out); !ok) return ok;
+        if (complete<T>(out)) break;
+    }
+    return {};
+}
+
+template <class T>
+Result<void> sample_layers(const std::vector<SpooledLayer<T>>& layers, const Rectangle& area,
+                           std::span<Resampled<T>> out) {
+    constexpr std::int64_t kChunk = WarpMap::kChunk;
+    std::vector<Resampled<T>> values;
+    for (std::int64_t y = chunk_of(area.j); y * kChunk < area.j + area.rows; ++y)
+        for (std::int64_t x = chunk_of(area.i); x * kChunk < area.i + area.columns; ++x) {
+            Rectangle part;
+            part.i = std::max(area.i, x * kChunk);
+            part.j = std::max(area.j, y * kChunk);
+            part.columns = std::min(area.i + area.columns, (x + 1) * kChunk) - part.i;
+            part.rows = std::min(area.j + area.rows, (y + 1) * kChunk) - part.j;
+            values.resize(static_cast<std::size_t>(part.count()));
+            if (auto ok = sample_chunk<T>(layers, part, values); !ok) return ok;
+            copy_part<Resampled<T>>(values, part, out, area, part);
+        }
+    return {};
+}
+
+// Reads a file band by band and lays the bands, cut at the spool's blocks, over its place in the layer.
+template <class T, class Read>
+Result<void> lay_file(const PlacedFile& file, const LayerMember& place, RasterSpool<T>& spool, const Read& read,
+                      const ReadProgress& progress) {
+    const std::int64_t width = file.info.width, height = file.info.height;
+    std::vector<T> band(static_cast<std::size_t>(kBandRows * width));
+    for (std::int64_t row = 0; row < height;) {
+        const std::int64_t to_block_end = kBandRows - (place.row + row) % kBandRows;
+        const std::int64_t rows = std::min(to_block_end, height - row);
+        const std::span<T> values(band.data(), static_cast<std::size_t>(rows * width));
+        if (auto ok = read(row, row + rows, values); !ok) return ok;
+        if (auto ok = spool.lay(place.column, place.row + row, width, rows, values); !ok) return ok;
+        row += rows;
+        if (progress && !progress(rows * width)) return interrupted();
+    }
+    return {};
+}
+
+template <class T>
+class HeightReader {
+public:
+    HeightReader(ImageSource& dem, const Georeference& where, const HeightReading& reading, bool raw)
+        : dem_(dem), voids_(dem.info(), reading), units_(raw ? HeightUnits{} : units_of(dem.info(), where, reading)) {}
+
+    Result<void> operator()(std::int64_t begin, std::int64_t end, std::span<T> out) {
+        values_.resize(out.size());
+        if (auto ok = dem_.read_channel(begin, end, std::span<double>(values_)); !ok) return ok;
+        voids_.apply(values_);
+        if (units_ != HeightUnits{})
+            for (double& v : values_) v = v * units_.scale + units_.offset_m;
+        std::transform(values_.begin(), values_.end(), out.begin(), [](double v) { return static_cast<T>(v); });
+        return {};
+    }
+
+private:
+    ImageSource& dem_;
+    VoidRule voids_;
+    HeightUnits units_;
+    std::vector<double> values_;
+};
+
+bool same_size(const PlacedFile& file, const ImageInfo& now) {
+    return file.info.width == now.width && file.info.height == now.height && file.info.channels == now.channels;
+}
+
+Error changed(const PlacedFile& file) {
+    return {ErrorCode::input, fmt::format("{}: has changed while it was read", file.path)};
+}
+
+template <class T>
+Result<SpooledLayer<T>> empty_layer(Layer layer, const TargetGrid& grid, const Crs& grid_crs,
+                                    const StackOptions& options, T nothing) {
+    auto map = WarpMap::make(grid, grid_crs, layer.where, layer.crs);
+    if (!map) return map.error();
+    auto spool = RasterSpool<T>::create(options.temporary + ".layer", layer.columns, layer.rows, nothing);
+    if (!spool) return spool.error();
+    // Points on samples take them as they are, with any kernel; nearest says so to the last bit.
+    const Kernel kernel = on_grid(layer, grid, grid_crs) ? Kernel::nearest : options.kernel;
+    return SpooledLayer<T>{std::move(layer), std::move(*map), std::move(*spool), kernel};
+}
+
+template <class T>
+Result<std::vector<SpooledLayer<T>>> read_heights(const std::vector<PlacedFile>& files, std::vector<Layer> layers,
+                                                  const TargetGrid& grid, const Crs& grid_crs, bool raw,
+                                                  const StackOptions& options, const ReadProgress& progress) {
+    std::vector<SpooledLayer<T>> spooled;
+    for (Layer& layer : layers) {
+        auto fresh = empty_layer<T>(std::move(layer), grid, grid_crs, options, static_cast<T>(kUncovered));
+        if (!fresh) return fresh.error();
+        for (const LayerMember& member : fresh->layer.members) {
+            const PlacedFile& file = files[member.file];
+            auto dem = open_heights(file.path, options.open);
+            if (!dem) return dem.error();
+            if (!same_size(file, (*dem)->info())) return changed(file);
+            HeightReader<T> reader(**dem, file.where, options.heights, raw);
+            if (auto ok = lay_file<T>(
+                    file, member, *fresh->spool,
+                    [&](std::int64_t begin, std::int64_t end, std::span<T> out) { return reader(begin, end, out); },
+                    progress);
+                !ok)
+                return ok.error();
+        }
+        spooled.push_back(std::move(*fresh));
+    }
+    return spooled;
+}
+
+std::int64_t samples_of(const std::vector<PlacedFile>& files) {
+    std::int64_t samples = 0;
+    for (const PlacedFile& f : files)
+        samples += (f.info.width + 2 * kBandRows) * (f.info.height + 2 * kBandRows);  // partly filled blocks
+    return samples;
+}
+
+bool wide(const std::vector<PlacedFile>& files, bool raw, const HeightReading& reading) {
+    return std::any_of(files.begin(), files.end(), [&](const PlacedFile& f) {
+        return !fits_float32(f.info.type) || (!raw && units_of(f.info, f.where, reading) != HeightUnits{});
+    });
+}
+
+}  // namespace
+
+bool on_grid(const Layer& layer, const TargetGrid& grid, const Crs& grid_crs) {
+    if (!layer.crs.same_as(grid_crs) || !layer.where.axis_aligned()) return false;
+    const double last_c = static_cast<double>(layer.columns - 1), last_r = static_cast<double>(layer.rows - 1);
+    const auto off = [](double v) { return std::abs(v - std::nearbyint(v)); };
+    const Georeference& w = layer.where;
+    // Corner by corner: offset and drift of both axes.
+    for (const double c : {0.0, last_c})
+        for (const double r : {0.0, last_r}) {
+            const double i = (w.x(c, r) - grid.x_m) / grid.step_m, j = (grid.y_m - w.y(c, r)) / grid.step_m;
+            if (!(off(i) <= kOnGrid && off(j) <= kOnGrid)) return false;
+        }
+    const auto unit_step = [&](double step, double last) {
+        return std::abs(std::abs(step) / grid.step_m - 1) * std::max(1.0, last) <= kOnGrid;
+    };
+    return unit_step(w.column_x, last_c) && unit_step(w.row_y, last_r);
+}
+
+std::int64_t height_stack_bytes(const std::vector<PlacedFile>& files) { return samples_of(files) * 8; }
+std::int64_t image_stack_bytes(const std::vector<PlacedFile>& files) { return samples_of(files) * 4; }
+
+struct HeightStack::Impl {
+    std::vector<SpooledLayer<float>> narrow;
+    std::vector<SpooledLayer<double>> wide;
+    std::vector<Layer> layers;
+    bool copied = false;
+};
+
+HeightStack::HeightStack(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+HeightStack::~HeightStack() = default;
+const std::vector<Layer>& HeightStack::layers() const { return impl_->layers; }
+bool HeightStack::copied() const { return impl_->copied; }
+
+Result<std::unique_ptr<HeightStack>> HeightStack::read(const std::vector<PlacedFile>& files, std::vector<Layer> layers,
+                                                       const TargetGrid& grid, const Crs& grid_crs, bool raw_values,
+                                                       const StackOptions& options, const ReadProgress& progress) {
+    auto impl = std::make_unique<Impl>();
+    impl->layers = layers;
+    impl->copied =
+        std::all_of(layers.begin(), layers.end(), [&](const Layer& l) { return on_grid(l, grid, grid_crs); });
+    if (wide(files, raw_values, options.heights)) {
+        auto read = read_heights<double>(files, std::move(layers), grid, grid_crs, raw_values, options, progress);
+        if (!read) return read.error();
+        impl->wide = std::move(*read);
+    } else {
+        auto read = read_heights<float>(files, std::move(layers), grid, grid_crs, raw_values, options, progress);
+        if (!read) return read.error();
+        impl->narrow = std::move(*read);
+    }
+    return std::unique_ptr<HeightStack>(new HeightStack(std::move(impl)));
+}
+
+Result<void> HeightStack::sample(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
+                                 std::span<double> out) const {
+    const Rectangle area{i, j, columns, rows};
+    return impl_->wide.empty() ? sample_layers<float>(impl_->narrow, area, out)
+                               : sample_layers<double>(impl_->wide, area, out);
+}
+
+struct ImageStack::Impl {
+    std::vector<SpooledLayer<std::uint32_t>> layers;
+};
+
+ImageStack::ImageStack(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+ImageStack::~ImageStack() = default;
+
+Result<std::unique_ptr<ImageStack>> ImageStack::read(const std::vector<PlacedFile>& files, std::vector<Layer> layers,
+                                                     const TargetGrid& grid, const Crs& grid_crs,
+                                                     const StackOptions& options, const ReadProgress& progress) {
+    auto impl = std::make_unique<Impl>();
+    for (Layer& layer : layers) {
+        auto fresh = empty_layer<std::uint32_t>(std::move(layer), grid, grid_crs, options, 0U);
+        if (!fresh) return fresh.error();
+        for (const LayerMember& member : fresh->layer.members) {
+            const PlacedFile& file = files[member.file];
+            auto image = ImageSource::open(file.path, options.open);
+            if (!image) return image.error();
+            if (!same_size(file, (*image)->info())) return changed(file);
+            const auto read = [&](std::int64_t begin, std::int64_t end, std::span<std::uint32_t> out) {
+                return (*image)->read_rgba8(begin, end, {reinterpret_cast<std::uint8_t*>(out.data()), out.size() * 4});
+            };
+            if (auto ok = lay_file<std::uint32_t>(file, member, *fresh->spool, read, progress); !ok) return ok.error();
+        }
+        impl->layers.push_back(std::move(*fresh));
+    }
+    return std::unique_ptr<ImageStack>(new ImageStack(std::move(impl)));
+}
+
+Result<void> ImageStack::sample(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
+                                std::span<std::uint32_t> out) const {
+    return sample_layers<std::uint32_t>(impl_->layers, {i, j, columns, rows}, out);
+}
+
+}  // namespace scree
