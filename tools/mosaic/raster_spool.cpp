@@ -154,6 +154,17 @@ Result<void> RasterSpool<T>::read(std::int64_t column, std::int64_t row, std::in
     return {};
 }
 
+template <class T>
+std::vector<typename RasterSpool<T>::Corner> RasterSpool<T>::corners() const {
+    std::vector<std::int64_t> indices;
+    for (const auto& [index, slot] : slot_of_) indices.push_back(index);
+    std::sort(indices.begin(), indices.end());
+    std::vector<Corner> corners;
+    for (const std::int64_t index : indices)
+        corners.push_back({index % blocks_across_ * kBlock, index / blocks_across_ * kBlock});
+    return corners;
+}
+
 template class RasterSpool<float>;
 template class RasterSpool<double>;
 template class RasterSpool<std::uint32_t>;

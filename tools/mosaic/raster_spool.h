@@ -44,6 +44,12 @@ public:
     Result<void> read(std::int64_t column, std::int64_t row, std::int64_t columns, std::int64_t rows,
                       std::span<T> out) const;
 
+    /// First samples of the blocks that hold anything, by rows.
+    struct Corner {
+        std::int64_t column = 0, row = 0;
+    };
+    std::vector<Corner> corners() const;
+
     std::int64_t columns() const { return columns_; }
     std::int64_t rows() const { return rows_; }
     std::int64_t file_bytes() const { return slots_ * kBlockBytes; }

@@ -18,17 +18,23 @@ constexpr double kUncovered = -std::numeric_limits<double>::infinity();
 constexpr double kVoid = std::numeric_limits<double>::quiet_NaN();
 constexpr std::uint32_t kOpaque = 128;
 
+// Points (i + c * stride, j + r * stride).
 struct Rectangle {
-    std::int64_t i = 0, j = 0, columns = 0, rows = 0;
+    std::int64_t i = 0, j = 0, columns = 0, rows = 0, stride = 1;
     std::int64_t count() const { return columns * rows; }
 };
 
-// One layer's raster with the way from grid points into it.
 template <class T>
 struct SpooledLayer {
     Layer layer;
-    WarpMap map;
     std::unique_ptr<RasterSpool<T>> spool;
+};
+
+// A layer with the way from grid points into it.
+template <class T>
+struct LayerOnGrid {
+    const SpooledLayer<T>* spooled;
+    WarpMap map;
     Kernel kernel;
 };
 
@@ -91,23 +97,26 @@ class LayerSampler {
 public:
     using Value = Resampled<T>;
 
-    LayerSampler(const SpooledLayer<T>& layer, const Rectangle& area) : layer_(layer) {
+    LayerSampler(const LayerOnGrid<T>& layer, const Rectangle& area) : layer_(layer) {
         const auto count = static_cast<std::size_t>(area.count());
         columns_.resize(count);
         rows_.resize(count);
         points_ = {columns_, rows_};
-        layer.map.map(area.i, area.j, area.columns, area.rows, points_);
+        if (area.stride == 1)
+            layer.map.map(area.i, area.j, area.columns, area.rows, points_);
+        else
+            map_sparse(area);
         // One footprint a chunk of the map: what is asked for does not change what is given.
         rule_ = {layer.kernel, layer.map.shrink_at(chunk_middle(area.i), chunk_middle(area.j)),
-                 layer.layer.half_sample_rim, layer.layer.columns, layer.layer.rows};
+                 layer.spooled->layer.half_sample_rim, layer.spooled->layer.columns, layer.spooled->layer.rows};
     }
 
-    std::optional<Window> window() const { return window_of(points_, layer_.layer, rule_); }
+    std::optional<Window> window() const { return window_of(points_, layer_.spooled->layer, rule_); }
 
     Result<void> overlay(const Window& w, std::span<Value> out) {
         const auto count = static_cast<std::size_t>(w.count());
         std::vector<T> stored(count);
-        if (auto ok = layer_.spool->read(w.column, w.row, w.columns, w.rows, stored); !ok) return ok;
+        if (auto ok = layer_.spooled->spool->read(w.column, w.row, w.columns, w.rows, stored); !ok) return ok;
         std::vector<Value> values(stored.begin(), stored.end());
         std::vector<Value> fresh(out.size());
         if constexpr (std::is_floating_point_v<T>) {
@@ -132,7 +141,19 @@ public:
     }
 
 private:
-    const SpooledLayer<T>& layer_;
+    void map_sparse(const Rectangle& area) {
+        const std::int64_t across = (area.columns - 1) * area.stride + 1, down = (area.rows - 1) * area.stride + 1;
+        std::vector<double> columns(static_cast<std::size_t>(across * down)), rows(columns.size());
+        layer_.map.map(area.i, area.j, across, down, {columns, rows});
+        std::size_t k = 0;
+        for (std::int64_t r = 0; r < down; r += area.stride)
+            for (std::int64_t c = 0; c < across; c += area.stride, ++k) {
+                columns_[k] = columns[static_cast<std::size_t>(r * across + c)];
+                rows_[k] = rows[static_cast<std::size_t>(r * across + c)];
+            }
+    }
+
+    const LayerOnGrid<T>& layer_;
     std::vector<double> columns_, rows_;
     SourcePoints points_;
     ResampleRule rule_;
@@ -149,13 +170,16 @@ bool complete(std::span<const Resampled<T>> out) {
 template <class V>
 void copy_part(std::span<const V> from, const Rectangle& from_area, std::span<V> to, const Rectangle& to_area,
                const Rectangle& part) {
-    for (std::int64_t j = part.j; j < part.j + part.rows; ++j)
-        std::copy_n(from.begin() + (j - from_area.j) * from_area.columns + (part.i - from_area.i), part.columns,
-                    to.begin() + (j - to_area.j) * to_area.columns + (part.i - to_area.i));
+    for (std::int64_t r = 0; r < part.rows; ++r) {
+        const auto at = [&](const Rectangle& area) {
+            return ((part.j - area.j) / area.stride + r) * area.columns + (part.i - area.i) / area.stride;
+        };
+        std::copy_n(from.begin() + at(from_area), part.columns, to.begin() + at(to_area));
+    }
 }
 
 template <class T>
-Result<void> overlay_layer(const SpooledLayer<T>& layer, const Rectangle& area, std::span<Resampled<T>> out) {
+Result<void> overlay_layer(const LayerOnGrid<T>& layer, const Rectangle& area, std::span<Resampled<T>> out) {
     LayerSampler<T> sampler(layer, area);
     const auto window = sampler.window();
     if (!window) return {};
@@ -165,11 +189,11 @@ Result<void> overlay_layer(const SpooledLayer<T>& layer, const Rectangle& area, 
     if (area.columns >= area.rows) {
         first.columns = area.columns / 2;
         second.columns = area.columns - first.columns;
-        second.i += first.columns;
+        second.i += first.columns * area.stride;
     } else {
         first.rows = area.rows / 2;
         second.rows = area.rows - first.rows;
-        second.j += first.rows;
+        second.j += first.rows * area.stride;
     }
     for (const Rectangle& part : {first, second}) {
         std::vector<Resampled<T>> values(static_cast<std::size_t>(part.count()));
@@ -181,7 +205,7 @@ Result<void> overlay_layer(const SpooledLayer<T>& layer, const Rectangle& area, 
 }
 
 template <class T>
-Result<void> sample_chunk(const std::vector<SpooledLayer<T>>& layers, const Rectangle& area,
+Result<void> sample_chunk(const std::vector<LayerOnGrid<T>>& layers, const Rectangle& area,
                           std::span<Resampled<T>> out) {
     if constexpr (std::is_floating_point_v<T>)
         std::fill(out.begin(), out.end(), kUncovered);
@@ -194,18 +218,32 @@ Result<void> sample_chunk(const std::vector<SpooledLayer<T>>& layers, const Rect
     return {};
 }
 
+// The points of one axis that fall into a chunk of the map.
+struct Share {
+    std::int64_t first = 0, count = 0;  // of the points
+};
+Share share_of(std::int64_t chunk, std::int64_t begin, std::int64_t count, std::int64_t stride) {
+    const auto points_before = [&](std::int64_t at) {
+        return std::clamp<std::int64_t>(at <= begin ? 0 : (at - begin + stride - 1) / stride, 0, count);
+    };
+    const std::int64_t first = points_before(chunk * WarpMap::kChunk),
+                       end = points_before((chunk + 1) * WarpMap::kChunk);
+    return {first, end - first};
+}
+
 template <class T>
-Result<void> sample_layers(const std::vector<SpooledLayer<T>>& layers, const Rectangle& area,
+Result<void> sample_layers(const std::vector<LayerOnGrid<T>>& layers, const Rectangle& area,
                            std::span<Resampled<T>> out) {
-    constexpr std::int64_t kChunk = WarpMap::kChunk;
     std::vector<Resampled<T>> values;
-    for (std::int64_t y = chunk_of(area.j); y * kChunk < area.j + area.rows; ++y)
-        for (std::int64_t x = chunk_of(area.i); x * kChunk < area.i + area.columns; ++x) {
-            Rectangle part;
-            part.i = std::max(area.i, x * kChunk);
-            part.j = std::max(area.j, y * kChunk);
-            part.columns = std::min(area.i + area.columns, (x + 1) * kChunk) - part.i;
-            part.rows = std::min(area.j + area.rows, (y + 1) * kChunk) - part.j;
+    const std::int64_t last_x = chunk_of(area.i + (area.columns - 1) * area.stride),
+                       last_y = chunk_of(area.j + (area.rows - 1) * area.stride);
+    for (std::int64_t y = chunk_of(area.j); y <= last_y; ++y)
+        for (std::int64_t x = chunk_of(area.i); x <= last_x; ++x) {
+            const Share across = share_of(x, area.i, area.columns, area.stride),
+                        down = share_of(y, area.j, area.rows, area.stride);
+            if (across.count == 0 || down.count == 0) continue;
+            const Rectangle part{area.i + across.first * area.stride, area.j + down.first * area.stride, across.count,
+                                 down.count, area.stride};
             values.resize(static_cast<std::size_t>(part.count()));
             if (auto ok = sample_chunk<T>(layers, part, values); !ok) return ok;
             copy_part<Resampled<T>>(values, part, out, area, part);
@@ -263,24 +301,31 @@ Error changed(const PlacedFile& file) {
 }
 
 template <class T>
-Result<SpooledLayer<T>> empty_layer(Layer layer, const TargetGrid& grid, const Crs& grid_crs,
-                                    const StackOptions& options, T nothing) {
-    auto map = WarpMap::make(grid, grid_crs, layer.where, layer.crs);
-    if (!map) return map.error();
+Result<SpooledLayer<T>> empty_layer(Layer layer, const StackOptions& options, T nothing) {
     auto spool = RasterSpool<T>::create(options.temporary + ".layer", layer.columns, layer.rows, nothing);
     if (!spool) return spool.error();
-    // Points on samples take them as they are, with any kernel; nearest says so to the last bit.
-    const Kernel kernel = on_grid(layer, grid, grid_crs) ? Kernel::nearest : options.kernel;
-    return SpooledLayer<T>{std::move(layer), std::move(*map), std::move(*spool), kernel};
+    return SpooledLayer<T>{std::move(layer), std::move(*spool)};
+}
+
+template <class T>
+Result<std::vector<LayerOnGrid<T>>> place_on(const std::vector<SpooledLayer<T>>& layers, const TargetGrid& grid,
+                                             const Crs& grid_crs, Kernel kernel) {
+    std::vector<LayerOnGrid<T>> placed;
+    for (const SpooledLayer<T>& l : layers) {
+        auto map = WarpMap::make(grid, grid_crs, l.layer.where, l.layer.crs);
+        if (!map) return map.error();
+        // Points on samples take them as they are, with any kernel; nearest says so to the last bit.
+        placed.push_back({&l, std::move(*map), on_grid(l.layer, grid, grid_crs) ? Kernel::nearest : kernel});
+    }
+    return placed;
 }
 
 template <class T>
 Result<std::vector<SpooledLayer<T>>> read_heights(const std::vector<PlacedFile>& files, std::vector<Layer> layers,
-                                                  const TargetGrid& grid, const Crs& grid_crs, bool raw,
-                                                  const StackOptions& options, const ReadProgress& progress) {
+                                                  bool raw, const StackOptions& options, const ReadProgress& progress) {
     std::vector<SpooledLayer<T>> spooled;
     for (Layer& layer : layers) {
-        auto fresh = empty_layer<T>(std::move(layer), grid, grid_crs, options, static_cast<T>(kUncovered));
+        auto fresh = empty_layer<T>(std::move(layer), options, static_cast<T>(kUncovered));
         if (!fresh) return fresh.error();
         for (const LayerMember& member : fresh->layer.members) {
             const PlacedFile& file = files[member.file];
@@ -336,45 +381,87 @@ std::int64_t height_stack_bytes(const std::vector<PlacedFile>& files) { return s
 std::int64_t image_stack_bytes(const std::vector<PlacedFile>& files) { return samples_of(files) * 4; }
 
 struct HeightStack::Impl {
-    std::vector<SpooledLayer<float>> narrow;
+    Kernel kernel = Kernel::bilinear;
+    std::vector<SpooledLayer<float>> narrow;  // one of the two is empty
     std::vector<SpooledLayer<double>> wide;
-    std::vector<Layer> layers;
-    bool copied = false;
 };
 
 HeightStack::HeightStack(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 HeightStack::~HeightStack() = default;
-const std::vector<Layer>& HeightStack::layers() const { return impl_->layers; }
-bool HeightStack::copied() const { return impl_->copied; }
 
 Result<std::unique_ptr<HeightStack>> HeightStack::read(const std::vector<PlacedFile>& files, std::vector<Layer> layers,
-                                                       const TargetGrid& grid, const Crs& grid_crs, bool raw_values,
-                                                       const StackOptions& options, const ReadProgress& progress) {
+                                                       bool raw_values, const StackOptions& options,
+                                                       const ReadProgress& progress) {
     auto impl = std::make_unique<Impl>();
-    impl->layers = layers;
-    impl->copied =
-        std::all_of(layers.begin(), layers.end(), [&](const Layer& l) { return on_grid(l, grid, grid_crs); });
+    impl->kernel = options.kernel;
     if (wide(files, raw_values, options.heights)) {
-        auto read = read_heights<double>(files, std::move(layers), grid, grid_crs, raw_values, options, progress);
+        auto read = read_heights<double>(files, std::move(layers), raw_values, options, progress);
         if (!read) return read.error();
         impl->wide = std::move(*read);
     } else {
-        auto read = read_heights<float>(files, std::move(layers), grid, grid_crs, raw_values, options, progress);
+        auto read = read_heights<float>(files, std::move(layers), raw_values, options, progress);
         if (!read) return read.error();
         impl->narrow = std::move(*read);
     }
     return std::unique_ptr<HeightStack>(new HeightStack(std::move(impl)));
 }
 
-Result<void> HeightStack::sample(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
-                                 std::span<double> out) const {
-    const Rectangle area{i, j, columns, rows};
+std::size_t HeightStack::layer_count() const { return impl_->narrow.size() + impl_->wide.size(); }
+
+const Layer& HeightStack::layer(std::size_t k) const {
+    return impl_->wide.empty() ? impl_->narrow[k].layer : impl_->wide[k].layer;
+}
+
+Result<void> HeightStack::samples(std::size_t k, std::int64_t column, std::int64_t row, std::int64_t columns,
+                                  std::int64_t rows, std::span<double> out) const {
+    if (impl_->narrow.empty()) return impl_->wide[k].spool->read(column, row, columns, rows, out);
+    std::vector<float> values(out.size());
+    auto ok = impl_->narrow[k].spool->read(column, row, columns, rows, values);
+    std::copy(values.begin(), values.end(), out.begin());
+    return ok;
+}
+
+std::vector<HeightStack::Block> HeightStack::blocks(std::size_t k) const {
+    std::vector<Block> blocks;
+    const auto add = [&](const auto& spool) {
+        for (const auto& corner : spool.corners()) blocks.push_back({corner.column, corner.row});
+    };
+    if (impl_->wide.empty())
+        add(*impl_->narrow[k].spool);
+    else
+        add(*impl_->wide[k].spool);
+    return blocks;
+}
+
+struct HeightGrid::Impl {
+    std::vector<LayerOnGrid<float>> narrow;
+    std::vector<LayerOnGrid<double>> wide;
+};
+
+HeightGrid::HeightGrid(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+HeightGrid::~HeightGrid() = default;
+
+Result<std::unique_ptr<HeightGrid>> HeightStack::on(const TargetGrid& grid, const Crs& grid_crs) const {
+    auto impl = std::make_unique<HeightGrid::Impl>();
+    auto narrow = place_on(impl_->narrow, grid, grid_crs, impl_->kernel);
+    if (!narrow) return narrow.error();
+    auto wide_layers = place_on(impl_->wide, grid, grid_crs, impl_->kernel);
+    if (!wide_layers) return wide_layers.error();
+    impl->narrow = std::move(*narrow);
+    impl->wide = std::move(*wide_layers);
+    return std::unique_ptr<HeightGrid>(new HeightGrid(std::move(impl)));
+}
+
+Result<void> HeightGrid::sample(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
+                                std::int64_t stride, std::span<double> out) const {
+    const Rectangle area{i, j, columns, rows, stride};
     return impl_->wide.empty() ? sample_layers<float>(impl_->narrow, area, out)
                                : sample_layers<double>(impl_->wide, area, out);
 }
 
 struct ImageStack::Impl {
     std::vector<SpooledLayer<std::uint32_t>> layers;
+    std::vector<LayerOnGrid<std::uint32_t>> placed;
 };
 
 ImageStack::ImageStack(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -385,7 +472,7 @@ Result<std::unique_ptr<ImageStack>> ImageStack::read(const std::vector<PlacedFil
                                                      const StackOptions& options, const ReadProgress& progress) {
     auto impl = std::make_unique<Impl>();
     for (Layer& layer : layers) {
-        auto fresh = empty_layer<std::uint32_t>(std::move(layer), grid, grid_crs, options, 0U);
+        auto fresh = empty_layer<std::uint32_t>(std::move(layer), options, 0U);
         if (!fresh) return fresh.error();
         for (const LayerMember& member : fresh->layer.members) {
             const PlacedFile& file = files[member.file];
@@ -399,12 +486,15 @@ Result<std::unique_ptr<ImageStack>> ImageStack::read(const std::vector<PlacedFil
         }
         impl->layers.push_back(std::move(*fresh));
     }
+    auto placed = place_on(impl->layers, grid, grid_crs, options.kernel);
+    if (!placed) return placed.error();
+    impl->placed = std::move(*placed);
     return std::unique_ptr<ImageStack>(new ImageStack(std::move(impl)));
 }
 
 Result<void> ImageStack::sample(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
                                 std::span<std::uint32_t> out) const {
-    return sample_layers<std::uint32_t>(impl_->layers, {i, j, columns, rows}, out);
+    return sample_layers<std::uint32_t>(impl_->placed, {i, j, columns, rows, 1}, out);
 }
 
 }  // namespace scree

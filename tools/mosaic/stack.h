@@ -32,28 +32,53 @@ using ReadProgress = std::function<bool(std::int64_t samples)>;
 std::int64_t height_stack_bytes(const std::vector<PlacedFile>& files);
 std::int64_t image_stack_bytes(const std::vector<PlacedFile>& files);
 
-/// Heights in metres: value * scale + offset as HeightReading and the file say; or raw values where all files agree
-/// (see raw_values).
+class HeightGrid;
+
+/// Heights in metres: value * scale + offset as HeightReading and the file say; or the files' raw values.
 class HeightStack {
 public:
     /// Decodes every file once. `raw_values`: hands out file values as they are. Errors: those of the files.
     static Result<std::unique_ptr<HeightStack>> read(const std::vector<PlacedFile>& files, std::vector<Layer> layers,
-                                                     const TargetGrid& grid, const Crs& grid_crs, bool raw_values,
-                                                     const StackOptions& options, const ReadProgress& progress);
+                                                     bool raw_values, const StackOptions& options,
+                                                     const ReadProgress& progress);
     ~HeightStack();
 
-    /// Points [i, i + columns) x [j, j + rows), row-major: the topmost layer's value; NaN: a void of the files;
-    /// -infinity: no file reaches here. Any thread. A point's value does not depend on the rectangle.
-    Result<void> sample(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
-                        std::span<double> out) const;
+    /// The heights on the points of a grid. The stack must outlive it.
+    Result<std::unique_ptr<HeightGrid>> on(const TargetGrid& grid, const Crs& grid_crs) const;
 
-    const std::vector<Layer>& layers() const;
-    /// True where every layer's samples are grid points: nothing is resampled.
-    bool copied() const;
+    std::size_t layer_count() const;
+    const Layer& layer(std::size_t k) const;
+    /// Samples of a layer as they are after its files were laid over one another: [column, column + columns) x ...,
+    /// row-major; NaN: void, -infinity: no file, also outside the layer. Any thread.
+    Result<void> samples(std::size_t k, std::int64_t column, std::int64_t row, std::int64_t columns, std::int64_t rows,
+                         std::span<double> out) const;
+    /// The blocks of RasterSpool::kBlock samples a side of a layer that hold anything, by rows.
+    struct Block {
+        std::int64_t column = 0, row = 0;  ///< first sample
+    };
+    std::vector<Block> blocks(std::size_t k) const;
+
+    struct Impl;
 
 private:
-    struct Impl;
     explicit HeightStack(std::unique_ptr<Impl> impl);
+    std::unique_ptr<Impl> impl_;
+};
+
+class HeightGrid {
+public:
+    ~HeightGrid();
+    /// Points (i + c * stride, j + r * stride), c < columns, r < rows, row-major: the topmost layer's value; NaN: a
+    /// void of the files; -infinity: no file reaches here. Any thread. A point's value does not depend on the
+    /// rectangle.
+    Result<void> sample(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows, std::int64_t stride,
+                        std::span<double> out) const;
+
+    struct Impl;
+
+private:
+    friend class HeightStack;
+    explicit HeightGrid(std::unique_ptr<Impl> impl);
     std::unique_ptr<Impl> impl_;
 };
 

@@ -81,12 +81,13 @@ Result<void> spool_mosaic(const BuildPlan& plan, const BuildOptions& options, He
         progress.add(static_cast<double>(samples) / 1e6);
         return !stop.load();
     };
-    auto stack = HeightStack::read(m.heights, m.height_layers, m.grid(), m.crs, m.same_units,
-                                   stack_options(plan, options), on_samples);
+    auto stack = HeightStack::read(m.heights, m.height_layers, m.same_units, stack_options(plan, options), on_samples);
     if (!stack) return stack.error();
+    auto grid = (*stack)->on(m.grid(), m.crs);
+    if (!grid) return grid.error();
     RowBands<double> bands(spool.width(),
                            [&](std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
-                               std::span<double> out) { return (*stack)->sample(i, j, columns, rows, out); });
+                               std::span<double> out) { return (*grid)->sample(i, j, columns, rows, 1, out); });
     std::vector<double> row(static_cast<std::size_t>(spool.width()));
     for (std::int64_t j = 0; j < spool.height(); ++j) {
         if (stop) return interrupted();
