@@ -1,0 +1,1 @@
+#include "tools/source/warp_map.h"
