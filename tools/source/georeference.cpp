@@ -120,22 +120,6 @@ void read_crs(GTIF* keys, GeotiffTags& tags) {
         reference.vertical_datum = epsg(*vertical_datum);
 }
 
-Result<void> check_steps(const Georeference& reference, const std::string& path, const char* where) {
-    for (const double value : {reference.first_x, reference.first_y, reference.column_x, reference.column_y,
-                               reference.row_x, reference.row_y}) {
-        if (!std::isfinite(value))
-            return Error{ErrorCode::input,
-                         fmt::format("{}: {} holds {}, so the samples lie nowhere", path, where, value)};
-    }
-    const double area = reference.column_x * reference.row_y - reference.column_y * reference.row_x;
-    if (area == 0 || !std::isfinite(area))
-        return Error{
-            ErrorCode::input,
-            fmt::format("{}: {} gives steps of ({}, {}) and ({}, {}), so all samples would lie on one line", path,
-                        where, reference.column_x, reference.column_y, reference.row_x, reference.row_y)};
-    return {};
-}
-
 // x = a*column + b*row + c, y = d*column + e*row + f in the file's own raster space.
 struct Affine {
     double a = 0, b = 0, c = 0, d = 0, e = 0, f = 0;
@@ -171,12 +155,12 @@ Result<void> read_transform(TIFF* file, const std::string& path, GeotiffTags& ta
             scale[0], 0, tie[3] - tie[0] * scale[0], 0, -std::abs(scale[1]), tie[4] + tie[1] * std::abs(scale[1])};
         apply(t, centre, tags.reference);
         tags.has_transform = true;
-        return check_steps(tags.reference, path, "its ModelPixelScale and ModelTiepoint");
+        return check_place(tags.reference, path, "its ModelPixelScale and ModelTiepoint");
     }
     if (has_matrix) {
         apply({matrix[0], matrix[1], matrix[3], matrix[4], matrix[5], matrix[7]}, centre, tags.reference);
         tags.has_transform = true;
-        return check_steps(tags.reference, path, "its ModelTransformation");
+        return check_place(tags.reference, path, "its ModelTransformation");
     }
     return {};
 }
@@ -249,7 +233,7 @@ Result<Georeference> parse_world_file(const std::string& path) {
     // The file's order is A D B E C F, and C F is already the centre of the upper-left sample.
     Georeference reference;
     apply({values[0], values[2], values[4], values[1], values[3], values[5]}, 0.0, reference);
-    if (Result<void> checked = check_steps(reference, path, "the world file"); !checked) return checked.error();
+    if (Result<void> checked = check_place(reference, path, "the world file"); !checked) return checked.error();
     return reference;
 }
 
@@ -258,6 +242,21 @@ Result<Georeference> parse_world_file(const std::string& path) {
 bool Georeference::axis_aligned() const {
     return std::abs(row_x) <= kNegligibleRotation * std::abs(column_x) &&
            std::abs(column_y) <= kNegligibleRotation * std::abs(row_y);
+}
+
+Result<void> check_place(const Georeference& place, const std::string& path, const char* where) {
+    for (const double value :
+         {place.first_x, place.first_y, place.column_x, place.column_y, place.row_x, place.row_y}) {
+        if (!std::isfinite(value))
+            return Error{ErrorCode::input,
+                         fmt::format("{}: {} holds {}, so the samples lie nowhere", path, where, value)};
+    }
+    const double area = place.column_x * place.row_y - place.column_y * place.row_x;
+    if (area == 0 || !std::isfinite(area))
+        return Error{ErrorCode::input,
+                     fmt::format("{}: {} gives steps of ({}, {}) and ({}, {}), so all samples would lie on one line",
+                                 path, where, place.column_x, place.column_y, place.row_x, place.row_y)};
+    return {};
 }
 
 Result<std::optional<Georeference>> read_geotiff(const std::string& path) {

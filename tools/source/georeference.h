@@ -30,6 +30,9 @@ struct Georeference {
     bool axis_aligned() const;
 };
 
+/// Numbers that place samples: finite, and not all on one line. Errors: ErrorCode::input; `where` is what holds them.
+Result<void> check_place(const Georeference& place, const std::string& path, const char* where);
+
 /// Reads GeoTIFF tags of a TIFF file; nullopt when it has none. Errors (ErrorCode::input) only for absurd values
 /// (NaN, infinite, zero step).
 Result<std::optional<Georeference>> read_geotiff(const std::string& path);

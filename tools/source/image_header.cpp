@@ -332,7 +332,9 @@ Result<ImageHeader> read_image_header(const std::string& path) {
     const std::optional<ImageKind> kind = kind_of(start, path);
     if (!kind) {
         return unusable(
-            path, "not an image of a known kind (TIFF, PNG, JPEG, JPEG 2000, OpenEXR, BMP, PNM, WebP, Targa, HDR)");
+            path,
+            "not an image of a known kind (TIFF, PNG, JPEG, JPEG 2000, OpenEXR, BMP, PNM, WebP, Targa, HDR) nor a DEM "
+            "of one (SRTM .hgt, DTED, ESRI ASCII grid, BIL, BIP, BSQ, GridFloat, ENVI, USGS DEM)");
     }
     ImageHeader header;
     header.kind = *kind;

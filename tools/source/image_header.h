@@ -29,9 +29,10 @@ struct ImageHeader {
     std::int64_t rows_per_strip = 1;  ///< rows that are decoded together; height when only the whole frame can be
     int significant_bits = 0;         ///< bits a sample holds in the file when fewer than its type has, else 0
     std::optional<PlainTiff> plain_tiff;
-    int alpha_channel = -1;             ///< TIFF only: from ExtraSamples
-    bool associated_alpha = false;      ///< colours are stored multiplied by alpha
-    std::optional<std::string> nodata;  ///< text of the GDAL_NODATA tag
+    int alpha_channel = -1;                    ///< TIFF only: from ExtraSamples
+    bool associated_alpha = false;             ///< colours are stored multiplied by alpha
+    std::optional<std::string> nodata;         ///< text of the GDAL_NODATA tag
+    double value_scale = 1, value_offset = 0;  ///< of GDAL_METADATA, see ImageInfo
 };
 
 /// The name OpenImageIO gives the reader of this kind.

@@ -13,6 +13,7 @@
 
 #include <fmt/format.h>
 
+#include "tools/source/grid_file.h"
 #include "tools/source/image_header.h"
 #include "tools/source/pixel_decoder.h"
 
@@ -96,6 +97,8 @@ public:
         info_.type = layout.type;
         info_.tiled = layout.tile_rows > 0;
         info_.alpha_channel = layout.alpha_channel < layout.channels ? layout.alpha_channel : -1;
+        info_.value_scale = header_.value_scale;
+        info_.value_offset = header_.value_offset;
         if (header_.nodata) info_.nodata = nodata_as(layout.type, *header_.nodata);
 
         const std::size_t sample_bytes = memory_bytes(layout.type);
@@ -220,7 +223,20 @@ private:
     std::int64_t band_end_ = 0;
 };
 
+Result<std::unique_ptr<ImageSource>> open_grid(const std::string& path, GridFile grid, const OpenOptions& options) {
+    ImageHeader header;
+    header.rows_per_strip = grid.rows_per_unit;
+    header.nodata = std::move(grid.nodata);
+    auto source = std::make_unique<DecodedSource>(path, header, std::move(grid.decoder));
+    if (Result<void> prepared = source->prepare(options); !prepared) return prepared.error();
+    source->place(std::move(grid.georeference));
+    return std::unique_ptr<ImageSource>(std::move(source));
+}
+
 Result<std::unique_ptr<ImageSource>> open_image(const std::string& path, const OpenOptions& options) {
+    Result<std::optional<GridFile>> grid = open_grid_file(path);
+    if (!grid) return grid.error();
+    if (grid->has_value()) return open_grid(path, std::move(**grid), options);
     Result<ImageHeader> header = read_image_header(path);
     if (!header) return header.error();
     if (header->rows_per_strip == header->height && header->height > 0) {

@@ -1,7 +1,7 @@
 // One opened raster file, read in bands of rows. Pixels come from OpenImageIO (plain TIFFs: from
-// libtiff itself, see tiff_decoder.cpp), georeference from GeoTIFF keys (libgeotiff)
-// or a world file. Memory held is one band of the file's own storage unit (a strip group, or one row of tiles).
-// Not thread-safe: one reader thread per object.
+// libtiff itself, see tiff_decoder.cpp; DEM formats: our own readers, see grid_file.h), georeference from GeoTIFF keys
+// (libgeotiff), the format's own header or a world file, and a .prj file. Memory held is one band of the file's own
+// storage unit (a strip group, or one row of tiles). Not thread-safe: one reader thread per object.
 #pragma once
 
 #include <cstdint>
@@ -30,12 +30,15 @@ struct ImageInfo {
     SampleType type = SampleType::u8;
     bool tiled = false;
     std::optional<double> nodata;  ///< GDAL_NODATA tag, already cast to the pixel type
-    std::int64_t unit_bytes = 0;   ///< decoded bytes of the largest unit that must be held at once
+    /// What samples stand for: value * value_scale + value_offset, in Georeference::height_unit_m where that is said
+    /// (GDAL's SCALE and OFFSET). read_channel and nodata are of the samples as they are stored.
+    double value_scale = 1, value_offset = 0;
+    std::int64_t unit_bytes = 0;  ///< decoded bytes of the largest unit that must be held at once
 };
 
 struct OpenOptions {
     std::int64_t max_unit_bytes =
-        INT64_MAX;          ///< a strip, row of tiles or frame above this is refused, naming the size needed
+        INT64_MAX;            ///< a strip, row of tiles or frame above this is refused, naming the size needed
     ColourReading colours{};  ///< for read_rgba8
 };
 
