@@ -31,9 +31,10 @@ Result<std::unique_ptr<ImageSource>> open_heights(const std::string& path, const
     return dem;
 }
 
-HeightUnits units_of(const ImageInfo&, const Georeference& where, const HeightReading& reading) {
+HeightUnits units_of(const ImageInfo& dem, const Georeference& where, const HeightReading& reading) {
+    if (reading.height_scale) return {*reading.height_scale, reading.height_offset_m};
     const double unit = where.height_unit_m > 0 ? where.height_unit_m : 1;
-    return {reading.height_scale.value_or(unit), reading.height_offset_m};
+    return {dem.value_scale * unit, dem.value_offset * unit + reading.height_offset_m};
 }
 
 VoidRule::VoidRule(const ImageInfo& dem, const HeightReading& reading) : tag_(dem.nodata), user_(reading.nodata) {
