@@ -41,6 +41,22 @@ struct SamplesOptions {
     bool force = false, quiet = false;
 };
 
+/// Sample (column, row) stands at (x_m + column * step_x_m, y_m - row * step_y_m).
+struct HeightPlace {
+    double x_m = 0, y_m = 0;
+    double step_x_m = 1, step_y_m = 1;
+};
+
+Result<HeightPlace> place_heights(const std::string& path, const ImageSource& dem, const HeightReading& reading) {
+    if (!dem.georeference()) {
+        if (!reading.spacing_m)
+            return Error{ErrorCode::input, fmt::format("{}: the file carries no georeference; give --spacing", path)};
+        return HeightPlace{0, 0, *reading.spacing_m, *reading.spacing_m};
+    }
+    const Georeference& where = *dem.georeference();
+    return HeightPlace{where.first_x, where.first_y, where.column_x, -where.row_y};
+}
+
 struct Block {
     std::string name;
     HeightPlace place;
@@ -114,7 +130,8 @@ private:
             make_lattice(place->x_m, place->y_m, place->step_x_m, info.width - 1, info.height - 1, kMinTileCellsLog2);
         if (!lattice) return Error{lattice.error().code, fmt::format("{}: {}", path, lattice.error().message)};
         const HeightReading& r = options_.reading;
-        const bool exact_in_float = fits_float32(info.type) && r.height_scale == 1 && r.height_offset_m == 0;
+        units_ = units_of(info, (*dem)->georeference().value_or(Georeference{}), r);
+        const bool exact_in_float = fits_float32(info.type) && units_ == HeightUnits{};
         const std::int64_t row_bytes = info.width * 12;  // as read, and as written
         if (row_bytes > options_.memory_bytes / 4)
             return Error{ErrorCode::usage,
@@ -149,10 +166,10 @@ private:
         for (double& v : band) {
             if (std::isnan(v)) continue;
             const double raw = v;
-            v = v * options_.reading.height_scale + options_.reading.height_offset_m;
+            v = v * units_.scale + units_.offset_m;
             if (!std::isfinite(v))
                 return Error{ErrorCode::input, fmt::format("{}: value {} times --height-scale {} is no finite height",
-                                                           path, raw, options_.reading.height_scale)};
+                                                           path, raw, units_.scale)};
             ++block.valid;
             block.lowest_m = std::min(block.lowest_m, v);
             block.highest_m = std::max(block.highest_m, v);
@@ -193,6 +210,7 @@ private:
     int fd_;
     Progress& progress_;
     std::int64_t end_ = 0, sources_done_ = 0;
+    HeightUnits units_;
     std::vector<float> narrow_;
 };
 
