@@ -15,8 +15,6 @@ namespace {
 constexpr double kOneSample = 1e-3;  // what may be lost by taking a grid for square or for the lattice's own, samples
 constexpr double kFinerBy = 1.1;     // a layer this much finer than the lattice asks for no finer one
 constexpr double kWarnedScale = 1.001;  // of the CRS against the ground
-constexpr const char* kUnnamedMetres =
-    R"wkt(ENGCRS["metres of the files",EDATUM["unknown"],CS[Cartesian,2],AXIS["easting",east],AXIS["northing",north],LENGTHUNIT["metre",1]])wkt";
 
 Error input_error(std::string message) { return {ErrorCode::input, std::move(message)}; }
 Error usage_error(std::string message) { return {ErrorCode::usage, std::move(message)}; }
@@ -156,7 +154,7 @@ private:
             if (request_.crs)
                 return usage_error(fmt::format("--crs {}: {} names no CRS to transform from; say it with --assume-crs",
                                                *request_.crs, unnamed));
-            return Crs::parse(kUnnamedMetres);
+            return Crs::unnamed_metres();
         }
         if (!unnamed.empty()) {
             if (heights_.front().where->crs.empty())
@@ -371,9 +369,7 @@ private:
 }  // namespace
 
 Result<MosaicPlan> plan_mosaic(const MosaicRequest& request) {
-    auto nowhere = Crs::parse(kUnnamedMetres);
-    if (!nowhere) return nowhere.error();
-    MosaicPlan plan(std::move(*nowhere));
+    MosaicPlan plan(Crs::unnamed_metres());
     if (auto ok = Planner(request, plan).run(); !ok) return ok.error();
     return plan;
 }

@@ -229,6 +229,12 @@ Result<Crs> Crs::parse(const std::string& given) {
     return Crs(std::move(impl));
 }
 
+Crs Crs::unnamed_metres() {
+    auto impl = std::make_shared<Impl>();
+    impl->name = "metres of the files";
+    return Crs(std::move(impl));
+}
+
 Crs::Crs(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
 Crs::Crs(const Crs&) = default;
 Crs::Crs(Crs&&) noexcept = default;

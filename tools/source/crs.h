@@ -17,6 +17,9 @@ public:
     /// part kept apart. Errors: ErrorCode::input, quoting the text (cut to 80 characters).
     static Result<Crs> parse(const std::string& text);
 
+    /// That of files which name none: metres of their own, the same as itself and nothing else.
+    static Crs unnamed_metres();
+
     const std::string& text() const;      ///< "EPSG:n" where the registry knows it (exactly), else one-line WKT2
     const std::string& name() const;      ///< for people
     const std::string& vertical() const;  ///< "EPSG:n" of the vertical part of a compound CRS, else empty
