@@ -36,13 +36,17 @@ struct MosaicPlan {
     std::string vertical_datum;  ///< "EPSG:n" or empty
     ScaleRange scale;            ///< of the CRS over the heights
     LonLatBox box;               ///< of the heights, where the CRS is known
-    Lattice lattice;
-    bool heights_copied = false;  ///< every height sample is a lattice point: nothing is resampled
-    bool same_units = false;      ///< one scale and offset for all files: raw values may be kept
-    double finest_pixel_m = 0;    ///< of the imagery, at its middle; 0 without imagery
+    Lattice lattice;             ///< of the finest layer
+    /// Everything is built densely at every 2^base_shift-th point; finer layers deepen their own branches.
+    int base_shift = 0;
+    std::vector<int> layer_level;  ///< of each height layer: the coarsest level that loses nothing of it
+    bool heights_copied = false;   ///< every height sample is a lattice point: nothing is resampled
+    bool same_units = false;       ///< one scale and offset for all files: raw values may be kept
+    double finest_pixel_m = 0;     ///< of the imagery, at its middle; 0 without imagery
     std::vector<std::string> warnings;
 
-    TargetGrid grid() const { return {lattice.origin_x_m, lattice.origin_y_m, lattice.spacing_m}; }
+    Lattice base_lattice() const;
+    TargetGrid finest_grid() const { return {lattice.origin_x_m, lattice.origin_y_m, lattice.spacing_m}; }
 };
 
 /// Errors: ErrorCode::input for files that cannot be placed, do not meet, or contradict each other; ErrorCode::usage

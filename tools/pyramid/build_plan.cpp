@@ -35,10 +35,10 @@ Result<int> log2_of(int value, int minimum_log2, int maximum_log2, const char* o
     return usage_error(fmt::format("{} is not one of {}", option, allowed));
 }
 
-// The smallest level whose texel is no more than 1.1 source pixels; and never coarser than a texel a cell, because
-// alpha says where heights end.
-int texture_depth(const Dataset& dataset, double source_texel_m) {
-    const double wanted = std::min(kTexelTolerance * source_texel_m, dataset.lattice.spacing_m * (1 + 1e-9));
+// The smallest level whose texel is no more than 1.1 source pixels; and never coarser than a texel a cell of the dense
+// part, because alpha says where heights end.
+int texture_depth(const Dataset& dataset, double cell_m, double source_texel_m) {
+    const double wanted = std::min(kTexelTolerance * source_texel_m, cell_m * (1 + 1e-9));
     int level = 0;
     while (level < kMaxLevel && dataset.texel_m(level) > wanted) ++level;
     return level;
@@ -49,7 +49,8 @@ bool north_up(const Georeference& where) { return where.axis_aligned() && where.
 // Files that are read straight through, row by row, need no copy.
 void choose_ways(const BuildOptions& o, BuildPlan& plan) {
     const MosaicPlan& m = plan.mosaic;
-    plan.heights_in_place = m.heights.size() == 1 && m.heights_copied && north_up(m.heights.front().where);
+    plan.heights_in_place =
+        m.base_shift == 0 && m.heights.size() == 1 && m.heights_copied && north_up(m.heights.front().where);
     plan.imagery_in_place = m.imagery.size() == 1 && m.imagery.front().crs.same_as(m.crs) &&
                             north_up(m.imagery.front().where) && o.kernel == Kernel::bilinear;
     plan.integer_heights =
@@ -68,17 +69,17 @@ std::int64_t widest_band_bytes(const std::vector<PlacedFile>& files, std::int64_
 void plan_resources(const BuildOptions& o, BuildPlan& plan) {
     const Dataset& d = plan.dataset;
     const MosaicPlan& m = plan.mosaic;
-    const std::int64_t width = d.lattice.cells_x + 1, rows = d.lattice.cells_y + 1;
-    std::int64_t heights = height_pyramid_bytes(d.lattice) + width * 32 * 8;
+    const Lattice base = m.base_lattice();
+    const std::int64_t width = base.cells_x + 1, rows = base.cells_y + 1;
+    std::int64_t heights = height_pyramid_bytes(base) + width * 32 * 8;
     if (plan.heights_in_place)
         heights += 2 * m.heights.front().info.unit_bytes;
     else
         heights = std::max(
             {heights, widest_band_bytes(m.heights, 12), width * 64 * 8 + threads_of(o) * kSamplingBytesAThread});
-    std::int64_t texture = TexturePyramid::bytes_needed(d.lattice, d.texture_size_log2, d.texture_deepest_level);
+    std::int64_t texture = TexturePyramid::bytes_needed(base, d.texture_size_log2, d.texture_deepest_level);
     const std::int64_t texels_wide =
-        d.lattice.cells_x *
-        static_cast<std::int64_t>(std::ceil(d.lattice.spacing_m / d.texel_m(d.texture_deepest_level)));
+        base.cells_x * static_cast<std::int64_t>(std::ceil(base.spacing_m / d.texel_m(d.texture_deepest_level)));
     if (plan.imagery_in_place)
         texture += ImageryRows::bytes_needed(m.imagery.front().info, texels_wide);
     else if (!m.imagery.empty())
@@ -90,14 +91,22 @@ void plan_resources(const BuildOptions& o, BuildPlan& plan) {
     if (!plan.imagery_in_place) plan.temporary_bytes += image_stack_bytes(m.imagery);
 
     double height_tiles = 0, texture_tiles = 0;
-    for (int level = 0; level <= d.deepest_level(); ++level) {
-        const double extent = std::ldexp(d.lattice.tile_cells(), d.lattice.deepest_level - level);
-        const double tiles = std::ceil(static_cast<double>(d.lattice.cells_x) / extent) *
-                             std::ceil(static_cast<double>(d.lattice.cells_y) / extent);
-        if (level <= d.lattice.deepest_level) height_tiles += tiles;
+    for (int level = 0; level <= std::max(base.deepest_level, d.texture_deepest_level); ++level) {
+        const double extent = std::ldexp(base.tile_cells(), base.deepest_level - level);
+        const double tiles = std::ceil(static_cast<double>(base.cells_x) / extent) *
+                             std::ceil(static_cast<double>(base.cells_y) / extent);
+        if (level <= base.deepest_level) height_tiles += tiles;
         if (level <= d.texture_deepest_level) texture_tiles += tiles;
     }
-    const double samples = d.lattice.tile_samples() * d.lattice.tile_samples();
+    for (std::size_t k = 0; k < m.height_layers.size(); ++k) {
+        if (m.layer_level[k] <= base.deepest_level) continue;
+        // With parents and what grading adds.
+        for (const LayerMember& member : m.height_layers[k].members)
+            height_tiles += 2 + 2 * static_cast<double>(m.heights[member.file].info.width) *
+                                    static_cast<double>(m.heights[member.file].info.height) /
+                                    std::ldexp(1.0, 2 * base.tile_cells_log2);
+    }
+    const double samples = base.tile_samples() * base.tile_samples();
     plan.store_bytes_estimate =
         static_cast<std::int64_t>(height_tiles * (samples * 2 + 200) +
                                   texture_tiles * static_cast<double>(bc1_chain_bytes(d.texture_size_log2)) * 1.02);
@@ -154,8 +163,8 @@ Result<BuildPlan> plan_build(const BuildOptions& o) {
     for (const PlacedFile& f : m.heights) d.sources.push_back(source_record(f.path, "heights", f.info));
     for (const PlacedFile& f : m.imagery) d.sources.push_back(source_record(f.path, "imagery", f.info));
     d.has_imagery = !m.imagery.empty();
-    const double source_texel = d.has_imagery ? m.finest_pixel_m : d.lattice.spacing_m;
-    d.texture_deepest_level = texture_depth(d, source_texel);
+    const double cell_m = m.base_lattice().spacing_m, source_texel = d.has_imagery ? m.finest_pixel_m : cell_m;
+    d.texture_deepest_level = texture_depth(d, cell_m, source_texel);
     if (!tile_key(d.lattice, {d.texture_deepest_level, 0, 0}))
         return input_error(fmt::format("imagery of {} m a pixel needs texture level {}, beyond the format's keys",
                                        source_texel, d.texture_deepest_level));

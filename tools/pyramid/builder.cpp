@@ -74,16 +74,21 @@ StackOptions stack_options(const BuildPlan& plan, const BuildOptions& options) {
     return {options.kernel, plan.open, options, options.out};
 }
 
-Result<void> spool_mosaic(const BuildPlan& plan, const BuildOptions& options, HeightSpool& spool, Progress& progress,
-                          const std::atomic<bool>& stop) {
+Result<std::unique_ptr<HeightStack>> read_stack(const BuildPlan& plan, const BuildOptions& options, Progress& progress,
+                                                const std::atomic<bool>& stop) {
     const MosaicPlan& m = plan.mosaic;
     const auto on_samples = [&](std::int64_t samples) {
         progress.add(static_cast<double>(samples) / 1e6);
         return !stop.load();
     };
-    auto stack = HeightStack::read(m.heights, m.height_layers, m.same_units, stack_options(plan, options), on_samples);
-    if (!stack) return stack.error();
-    auto grid = (*stack)->on(m.grid(), m.crs);
+    return HeightStack::read(m.heights, m.height_layers, m.same_units, stack_options(plan, options), on_samples);
+}
+
+TargetGrid grid_of(const Lattice& lattice) { return {lattice.origin_x_m, lattice.origin_y_m, lattice.spacing_m}; }
+
+Result<void> spool_stack(const BuildPlan& plan, const HeightStack& stack, HeightSpool& spool,
+                         const std::atomic<bool>& stop) {
+    auto grid = stack.on(grid_of(plan.mosaic.base_lattice()), plan.mosaic.crs);
     if (!grid) return grid.error();
     RowBands<double> bands(spool.width(),
                            [&](std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
@@ -98,6 +103,58 @@ Result<void> spool_mosaic(const BuildPlan& plan, const BuildOptions& options, He
         if (auto ok = spool.append(row); !ok) return ok;
     }
     return {};
+}
+
+// Where finer layers go on below the dense part.
+struct DeepPart {
+    DeepTree tree;
+    std::unique_ptr<HeightGrid> grid;
+    std::optional<DeepHeights> heights;
+};
+
+// Every block of samples that a layer has deepens the tiles under it.
+Result<void> mark_layer(const MosaicPlan& m, const HeightStack& stack, std::size_t k, DeepTree& tree) {
+    const Layer& layer = stack.layer(k);
+    auto transform = CrsTransform::make(layer.crs, m.crs);
+    if (!transform) return transform.error();
+    constexpr auto kBlock = static_cast<double>(RasterSpool<float>::kBlock);
+    const auto last_column = static_cast<double>(layer.columns - 1), last_row = static_cast<double>(layer.rows - 1);
+    for (const HeightStack::Block& block : stack.blocks(k)) {
+        std::vector<double> x, y;
+        for (const double v : {0.0, kBlock / 2, kBlock})
+            for (const double u : {0.0, kBlock / 2, kBlock}) {
+                const double column = std::min(static_cast<double>(block.column) + u, last_column),
+                             row = std::min(static_cast<double>(block.row) + v, last_row);
+                x.push_back(layer.where.x(column, row));
+                y.push_back(layer.where.y(column, row));
+            }
+        transform->apply(x, y);
+        double west = std::numeric_limits<double>::infinity(), north = west, east = -west, south = -west;
+        for (std::size_t p = 0; p < x.size(); ++p) {
+            const double i = m.lattice.i_of(x[p]), j = m.lattice.j_of(y[p]);
+            if (!std::isfinite(i) || !std::isfinite(j)) continue;
+            west = std::min(west, i);
+            east = std::max(east, i);
+            north = std::min(north, j);
+            south = std::max(south, j);
+        }
+        if (west <= east) tree.mark(west, north, east, south, m.layer_level[k]);
+    }
+    return {};
+}
+
+Result<std::unique_ptr<DeepPart>> plan_depth(const BuildPlan& plan, const HeightStack& stack, const HeightSpool& spool,
+                                             const HeightQuantizer& quantizer) {
+    const MosaicPlan& m = plan.mosaic;
+    auto deep = std::make_unique<DeepPart>(DeepPart{DeepTree(m.lattice, m.base_lattice().deepest_level), nullptr, {}});
+    for (std::size_t k = 0; k < stack.layer_count(); ++k)
+        if (auto ok = mark_layer(m, stack, k, deep->tree); !ok) return ok.error();
+    deep->tree.grade();
+    auto grid = stack.on(m.finest_grid(), m.crs);
+    if (!grid) return grid.error();
+    deep->grid = std::move(*grid);
+    deep->heights.emplace(*deep->grid, spool, quantizer, m.base_shift);
+    return deep;
 }
 
 // Presence and tint of the cells under the texel rows, taken from the spool as rows are asked for in order.
@@ -184,7 +241,7 @@ struct TextureStage {
 
 Result<std::int64_t> compose_textures(TextureStage& s, const TexelRows& imagery) {
     const Dataset& d = s.plan.dataset;
-    const Lattice& lattice = d.lattice;
+    const Lattice lattice = s.plan.mosaic.base_lattice();
     TexturePyramid pyramid({&s.writer, lattice, d.texture_size_log2, d.texture_deepest_level, &s.heights.tiles});
     const double cells_per_texel = d.texel_m(d.texture_deepest_level) / lattice.spacing_m;  // a power of two, <= 1
     CellRows cells(s.spool, s.quantizer, {d.min_height_m, d.max_height_m, lattice.spacing_m});
@@ -216,7 +273,7 @@ Result<std::int64_t> build_textures(TextureStage& s) {
     if (m.imagery.empty()) return compose_textures(s, {});
     const double texel = d.texel_m(d.texture_deepest_level);
     const TargetGrid grid{d.lattice.origin_x_m + texel / 2, d.lattice.origin_y_m - texel / 2, texel};
-    const std::int64_t width = TexturePyramid::width_of(d.lattice, d.texture_size_log2, d.texture_deepest_level);
+    const std::int64_t width = TexturePyramid::width_of(m.base_lattice(), d.texture_size_log2, d.texture_deepest_level);
     if (s.plan.imagery_in_place) {
         auto image = ImageSource::open(m.imagery.front().path, s.plan.open);
         if (!image) return image.error();
@@ -270,7 +327,7 @@ Result<BuildReport> build_store(BuildPlan plan, const BuildOptions& options, con
         options.threads > 0 ? options.threads : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
     Dataset& d = plan.dataset;
-    const Lattice& lattice = d.lattice;
+    const Lattice lattice = plan.mosaic.base_lattice();
     const std::int64_t width = lattice.cells_x + 1, height = lattice.cells_y + 1;
     const double dem_pixels = megapixels(plan.mosaic.heights),
                  lattice_points = static_cast<double>(width) * static_cast<double>(height) / 1e6;
@@ -284,8 +341,14 @@ Result<BuildReport> build_store(BuildPlan plan, const BuildOptions& options, con
     Progress progress("building", "MPix", options.quiet);
     progress.set_total(dem_pixels + lattice_points + image_megapixels(plan));
 
-    auto spooled = plan.heights_in_place ? spool_in_place(plan, options, **spool, progress, stop)
-                                         : spool_mosaic(plan, options, **spool, progress, stop);
+    std::unique_ptr<HeightStack> stack;
+    if (!plan.heights_in_place) {
+        auto read = read_stack(plan, options, progress, stop);
+        if (!read) return read.error();
+        stack = std::move(*read);
+    }
+    auto spooled =
+        stack ? spool_stack(plan, *stack, **spool, stop) : spool_in_place(plan, options, **spool, progress, stop);
     if (!spooled) return spooled.error();
     const std::string& first_dem = plan.mosaic.heights.front().path;
     auto summary = (*spool)->finish();
@@ -297,10 +360,18 @@ Result<BuildReport> build_store(BuildPlan plan, const BuildOptions& options, con
                                        summary->min_raw, summary->max_raw});
     if (!quantizer) return Error{quantizer.error().code, fmt::format("{}: {}", first_dem, quantizer.error().message)};
 
-    auto heights = build_height_pyramid({spool->get(), writer->get(), d.lattice, *quantizer, [&](std::int64_t) {
+    std::unique_ptr<DeepPart> deep;
+    if (plan.mosaic.base_shift > 0) {
+        auto planned = plan_depth(plan, *stack, **spool, *quantizer);
+        if (!planned) return planned.error();
+        deep = std::move(*planned);
+    }
+    auto heights = build_height_pyramid({spool->get(), writer->get(), lattice, *quantizer,
+                                         [&](std::int64_t) {
                                              progress.add(static_cast<double>(width) / 1e6);
                                              return !stop.load();
-                                         }});
+                                         },
+                                         deep ? &deep->tree : nullptr, deep ? &*deep->heights : nullptr, d.lattice});
     if (!heights) return heights.error().code == ErrorCode::interrupted ? interrupted() : heights.error();
     if (heights->tile_count == 0)
         return Error{ErrorCode::input,

@@ -35,6 +35,18 @@ Result<void> write_at(int fd, const std::string& path, const std::uint8_t* data,
     return {};
 }
 
+Result<void> read_at(int fd, const std::string& path, std::uint8_t* data, std::int64_t size, std::int64_t offset) {
+    std::int64_t done = 0;
+    while (done < size) {
+        errno = 0;
+        const ssize_t n = ::pread(fd, data + done, static_cast<std::size_t>(size - done), offset + done);
+        if (n < 0 && errno == EINTR) continue;
+        if (n <= 0) return io_error(path, "cannot read");
+        done += n;
+    }
+    return {};
+}
+
 // Linear between the nearest valid neighbours of the row, constant outside them. False: no valid sample.
 bool fill_row(std::vector<double>& row) {
     const std::size_t width = row.size();
@@ -145,14 +157,8 @@ Result<const std::uint8_t*> HeightSpool::row_bytes(std::int64_t j) {
         chunk_first_ = j;
         chunk_rows_ = std::clamp<std::int64_t>(kReadChunkBytes / row_bytes_, 1, height_ - j);
         chunk_.resize(static_cast<std::size_t>(chunk_rows_ * row_bytes_));
-        std::int64_t done = 0, size = chunk_rows_ * row_bytes_;
-        while (done < size) {
-            const ssize_t n = ::pread(file_.fd, chunk_.data() + done, static_cast<std::size_t>(size - done),
-                                      chunk_first_ * row_bytes_ + done);
-            if (n < 0 && errno == EINTR) continue;
-            if (n <= 0) return io_error(path_, "cannot read");
-            done += n;
-        }
+        if (auto ok = read_at(file_.fd, path_, chunk_.data(), chunk_rows_ * row_bytes_, chunk_first_ * row_bytes_); !ok)
+            return ok.error();
     }
     return static_cast<const std::uint8_t*>(chunk_.data() + (j - chunk_first_) * row_bytes_);
 }
@@ -171,6 +177,34 @@ Result<void> HeightSpool::read_row(std::int64_t j, std::span<double> values, std
         }
     }
     return read_valid(j, valid);
+}
+
+Result<void> HeightSpool::read_window(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
+                                      std::span<double> values, std::span<std::uint8_t> valid) const {
+    assert(i >= 0 && j >= 0 && i + columns <= width_ && j + rows <= height_);
+    const std::int64_t value_bytes = wide_ ? 8 : 4, bits_at = width_ * value_bytes;
+    std::vector<std::uint8_t> bytes(static_cast<std::size_t>(columns * value_bytes)),
+        bits(static_cast<std::size_t>(columns / 8 + 2));
+    for (std::int64_t r = 0; r < rows; ++r) {
+        const std::int64_t at = (j + r) * row_bytes_, first_bit = i / 8, end_bit = (i + columns + 7) / 8;
+        if (auto ok = read_at(file_.fd, path_, bytes.data(), columns * value_bytes, at + i * value_bytes); !ok)
+            return ok;
+        if (auto ok = read_at(file_.fd, path_, bits.data(), end_bit - first_bit, at + bits_at + first_bit); !ok)
+            return ok;
+        for (std::int64_t c = 0; c < columns; ++c) {
+            const auto k = static_cast<std::size_t>(r * columns + c);
+            if (wide_) {
+                std::memcpy(&values[k], bytes.data() + c * 8, 8);
+            } else {
+                float v = 0;
+                std::memcpy(&v, bytes.data() + c * 4, 4);
+                values[k] = v;
+            }
+            const std::int64_t bit = i + c - first_bit * 8;
+            valid[k] = (bits[static_cast<std::size_t>(bit / 8)] >> (bit % 8)) & 1;
+        }
+    }
+    return {};
 }
 
 Result<void> HeightSpool::read_valid(std::int64_t j, std::span<std::uint8_t> valid) {

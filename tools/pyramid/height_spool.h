@@ -41,6 +41,10 @@ public:
     /// Validity alone.
     Result<void> read_valid(std::int64_t j, std::span<std::uint8_t> valid);
 
+    /// Samples [i, i + columns) x [j, j + rows), row-major. Any thread, once finish() is through.
+    Result<void> read_window(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
+                             std::span<double> values, std::span<std::uint8_t> valid) const;
+
     std::int64_t width() const { return width_; }
     std::int64_t height() const { return height_; }
 
