@@ -14,8 +14,7 @@ namespace {
 
 constexpr double kOneSample = 1e-3;  // what may be lost by taking a grid for square or for the lattice's own, samples
 constexpr double kFinerBy = 1.1;     // a layer this much finer than the lattice asks for no finer one
-constexpr double kDenseShare = 4;    // points of the dense part for each sample of the sources
-constexpr double kAlwaysDense = 1 << 20;
+constexpr double kBranchCost = 2;       // of a point made tile by tile, against one of the dense part
 constexpr double kWarnedScale = 1.001;  // of the CRS against the ground
 
 Error input_error(std::string message) { return {ErrorCode::input, std::move(message)}; }
@@ -314,7 +313,7 @@ private:
         if (!(east - west <= kMost && south - north <= kMost))
             return input_error(fmt::format("the heights span {} x {} cells of {} m; a store has at most {} a side",
                                            east - west, south - north, step, kMaxCellsPerSide));
-        const int shift = base_shift((east - west) * (south - north));
+        const int shift = base_shift((east - west) * (south - north), step);
         const double unit = std::ldexp(1.0, shift);
         west = std::floor(west / unit) * unit;
         north = std::floor(north / unit) * unit;
@@ -326,24 +325,37 @@ private:
         if (!lattice) return lattice.error();
         plan_.lattice = *lattice;
         plan_.base_shift = std::min(shift, lattice->deepest_level);
-        for (const double cell : cell_sizes_) {
-            const int coarser = static_cast<int>(std::floor(std::log2(std::max(1.0, cell * kFinerBy / step))));
-            plan_.layer_level.push_back(std::max(lattice->deepest_level - coarser, 0));
-        }
+        for (const double cell : cell_sizes_)
+            plan_.layer_level.push_back(std::max(lattice->deepest_level - coarser_by(cell, step), 0));
         return {};
     }
 
-    // Halvings that are left to single branches: as many as it takes to keep the dense part in proportion to the data.
-    int base_shift(double points) const {
-        double samples = 0;
-        for (const PlacedFile& f : plan_.heights)
-            samples += static_cast<double>(f.info.width) * static_cast<double>(f.info.height);
-        int shift = 0;
-        while (points > std::max(kDenseShare * samples, kAlwaysDense) && shift < kMaxLevel) {
-            points /= 4;
-            ++shift;
+    // Halvings that are left to single branches: those that make the fewest points in all. `points`: of the finest
+    // lattice, if it were dense.
+    int base_shift(double points, double step) const {
+        int best = 0;
+        double least = std::numeric_limits<double>::infinity();
+        for (int shift = 0; shift <= kMaxLevel && std::ldexp(points, -2 * shift) >= 1; ++shift) {
+            double cost = std::ldexp(points, -2 * shift);
+            for (std::size_t k = 0; k < plan_.height_layers.size(); ++k)
+                if (coarser_by(cell_sizes_[k], step) < shift) cost += kBranchCost * points_of(plan_.height_layers[k]);
+            if (cost < least) best = shift;
+            least = std::min(least, cost);
         }
-        return shift;
+        return best;
+    }
+
+    static int coarser_by(double cell, double step) {
+        return static_cast<int>(std::floor(std::log2(std::max(1.0, cell * kFinerBy / step))));
+    }
+
+    double points_of(const Layer& layer) const {
+        double points = 0;
+        for (const LayerMember& member : layer.members) {
+            const ImageInfo& info = plan_.heights[member.file].info;
+            points += static_cast<double>(info.width) * static_cast<double>(info.height);
+        }
+        return points;
     }
 
     bool one_unit() const {
