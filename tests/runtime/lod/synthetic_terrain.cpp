@@ -47,6 +47,7 @@ SyntheticTerrain::SyntheticTerrain(const TerrainShape& shape, HeightFunction hei
         low = std::min(low, dataset_.height_m(stored_[ids_[k]].header.own.min_n));
         high = std::max(high, dataset_.height_m(stored_[ids_[k]].header.own.max_n));
     }
+    if (depth_.varies()) map_leaves();
     int coarsest = lattice->deepest_level;
     for (const TileId id : ids_)
         if (is_leaf(id)) coarsest = std::min(coarsest, id.level);
@@ -99,13 +100,25 @@ std::optional<TileId> SyntheticTerrain::leaf_over(std::int64_t i, std::int64_t j
     const Lattice& l = lattice();
     const std::int64_t width = l.root_columns * l.tile_extent(0), height = l.root_rows * l.tile_extent(0);
     if (i < 0 || j < 0 || i >= width || j >= height) return std::nullopt;
-    const TileId deepest{l.deepest_level, i >> l.tile_cells_log2, j >> l.tile_cells_log2};
-    for (int level = 0; level <= l.deepest_level; ++level) {
-        const TileId id = ancestor_at(deepest, level);
-        if (tile(id) == nullptr) return std::nullopt;
-        if (is_leaf(id)) return id;
+    if (!depth_.varies()) {
+        const TileId id{l.deepest_level, i >> l.tile_cells_log2, j >> l.tile_cells_log2};
+        return tile(id) != nullptr ? std::optional(id) : std::nullopt;
     }
-    return std::nullopt;
+    const std::int32_t leaf = leaves_[static_cast<std::size_t>(j * width + i)];
+    return leaf < 0 ? std::nullopt : std::optional(ids_[static_cast<std::size_t>(leaf)]);
+}
+
+void SyntheticTerrain::map_leaves() {
+    const Lattice& l = lattice();
+    const std::int64_t width = l.root_columns * l.tile_extent(0), height = l.root_rows * l.tile_extent(0);
+    leaves_.assign(static_cast<std::size_t>(width * height), -1);
+    for (std::size_t k = 0; k < ids_.size(); ++k) {
+        if (!is_leaf(ids_[k])) continue;
+        const LatticePoint corner = l.corner(ids_[k]);
+        const std::int64_t extent = l.tile_extent(ids_[k].level);
+        for (std::int64_t j = corner.j; j < corner.j + extent; ++j)
+            std::fill_n(leaves_.begin() + (j * width + corner.i), extent, static_cast<std::int32_t>(k));
+    }
 }
 
 bool SyntheticTerrain::present(std::int64_t i, std::int64_t j) const {

@@ -78,6 +78,7 @@ private:
     bool make_tile(TileId id);
     bool make_leaf(TileId id, HeightTile& tile);
     void grow_errors(HeightBounds& bounds) const;
+    void map_leaves();
     void make_textures();
 
     Dataset dataset_;
@@ -88,6 +89,7 @@ private:
     std::unordered_map<TileId, HeightTile, TileIdHash> stored_;
     std::unordered_map<TileId, std::int32_t, TileIdHash> indices_, texture_indices_;
     std::vector<TileId> ids_, texture_ids_;
+    std::vector<std::int32_t> leaves_;  ///< by finest cell: index of the leaf over it, -1; where depth varies
 };
 
 /// Rough ground from integer noise of several wavelengths, -amplitude..amplitude quanta.
