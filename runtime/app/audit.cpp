@@ -96,41 +96,53 @@ double ErrorHistogram::quantile(double q) const {
     return max_;
 }
 
+namespace {
+
+// Visits the leaves at or under a tile: the finest surface there.
+template <class Visit>
+Result<void> for_each_leaf(TileReader& reader, const Lattice& lattice, TileId id, const Visit& visit) {
+    TileRow row;
+    auto found = reader.read(TileKind::height, id, row);
+    if (!found) return found.error();
+    if (!*found) return {};
+    const auto tile = decode_height_tile(row.payload, lattice.tile_cells_log2, row.codec);
+    if (!tile) return tile.error();
+    if (tile->header.is_leaf() || id.level >= lattice.deepest_level) return visit(id, *tile), Result<void>{};
+    for (int q = 0; q < 4; ++q)
+        if ((tile->header.child_mask >> q & 1) != 0)
+            if (auto ok = for_each_leaf(reader, lattice, child_of(id, q), visit); !ok) return ok;
+    return {};
+}
+
+}  // namespace
+
 Result<void> audit_frame(const TileStore& store, TileReader& reader, const AuditedFrame& frame,
                          ErrorHistogram& errors) {
     const Dataset& d = store.dataset();
     const Lattice& l = d.lattice;
-    const int n = l.tile_cells_log2;
     const std::int64_t m = l.tile_cells();
     const Judge judge(frame);
     DrawnTile drawn(
         l, make_relative_frame(l, d.height_offset_m, d.height_quantum_m, frame.camera.eye, frame.half_curvature));
-    TileRow row;
     for (const DrawItem& item : frame.draws) {
         drawn.set(item, frame.arena.vertices(item.height_slot));
         const LatticePoint corner = l.corner(item.tile);
-        const int up = l.deepest_level - item.tile.level;
-        for (std::int64_t y = item.tile.y << up; y < (item.tile.y + 1) << up; ++y)
-            for (std::int64_t x = item.tile.x << up; x < (item.tile.x + 1) << up; ++x) {
-                const TileId id{l.deepest_level, x, y};
-                if (x * m >= l.cells_x || y * m >= l.cells_y) continue;
-                auto found = reader.read(TileKind::height, id, row);
-                if (!found) return found.error();
-                if (!*found) continue;
-                auto tile = decode_height_tile(row.payload, n, row.codec);
-                if (!tile) return tile.error();
-                const auto present = present_vertices(tile->presence, n);
-                for (std::int64_t r = 0; r <= m; ++r)
-                    for (std::int64_t c = 0; c <= m; ++c) {
-                        const auto k = static_cast<std::size_t>(r * (m + 1) + c);
-                        if (!present.empty() && present[k] == 0) continue;
-                        const std::int64_t i = x * m + c, j = y * m + r;
-                        const glm::dvec3 truth{l.x_m(static_cast<double>(i)), l.y_m(static_cast<double>(j)),
-                                               d.height_m(tile->samples[k])};
-                        judge.add(truth, drawn, static_cast<double>(i - corner.i), static_cast<double>(j - corner.j),
-                                  errors);
-                    }
-            }
+        auto ok = for_each_leaf(reader, l, item.tile, [&](TileId id, const HeightTile& leaf) {
+            const auto present = present_vertices(leaf.presence, l.tile_cells_log2);
+            const LatticePoint first = l.corner(id);
+            const std::int64_t step = l.step(id.level);
+            for (std::int64_t r = 0; r <= m; ++r)
+                for (std::int64_t c = 0; c <= m; ++c) {
+                    const auto k = static_cast<std::size_t>(r * (m + 1) + c);
+                    if (!present.empty() && present[k] == 0) continue;
+                    const std::int64_t i = first.i + c * step, j = first.j + r * step;
+                    const glm::dvec3 truth{l.x_m(static_cast<double>(i)), l.y_m(static_cast<double>(j)),
+                                           d.height_m(leaf.samples[k])};
+                    judge.add(truth, drawn, static_cast<double>(i - corner.i), static_cast<double>(j - corner.j),
+                              errors);
+                }
+        });
+        if (!ok) return ok;
     }
     return {};
 }

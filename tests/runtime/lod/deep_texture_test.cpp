@@ -22,8 +22,9 @@ Square square_of(const Lattice& l, const DrawItem& item) {
 }
 
 struct DeepWorld {
-    explicit DeepWorld(test::Random& random)
-        : terrain(test::random_terrain(random, test::kDeepTextures)), selector(terrain.dataset()) {}
+    DeepWorld(test::Random& random, int world)
+        : terrain(test::random_terrain(random, test::kDeepTextures, 1, test::depth_of_world(world))),
+          selector(terrain.dataset()) {}
     Camera near_camera(test::Random& random) const {
         const Lattice& l = terrain.lattice();
         const auto i = test::uniform(random, 0, static_cast<int>(l.cells_x)),
@@ -44,7 +45,7 @@ TEST(DeepTextures, PartsDrawEveryPresentCellOfTheirTileOnceWithItsMesh) {
     test::Random random(test::seed());
     std::int64_t parts = 0;
     for (int world = 0; world < 12; ++world) {
-        DeepWorld w(random);
+        DeepWorld w(random, world);
         const Lattice& l = w.terrain.lattice();
         const TilePatterns patterns(l.tile_cells_log2);
         for (int k = 0; k < 10; ++k) {
@@ -85,7 +86,7 @@ TEST(DeepTextures, EachPartLiesWhereItsScaleAndOffsetSayInItsTexture) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());
     for (int world = 0; world < 10; ++world) {
-        DeepWorld w(random);
+        DeepWorld w(random, world);
         const Lattice& l = w.terrain.lattice();
         for (int k = 0; k < 10; ++k) {
             test::FakeResidency residency(w.terrain);
@@ -119,7 +120,7 @@ TEST(DeepTextures, WithEverythingResidentATexelCoversNoMorePixelsThanAllowed) {
     test::Random random(test::seed());
     std::int64_t checked = 0;
     for (int world = 0; world < 10; ++world) {
-        DeepWorld w(random);
+        DeepWorld w(random, world);
         const Lattice& l = w.terrain.lattice();
         const Dataset& d = w.terrain.dataset();
         test::FakeResidency residency(w.terrain);
@@ -133,7 +134,9 @@ TEST(DeepTextures, WithEverythingResidentATexelCoversNoMorePixelsThanAllowed) {
                 const int level = w.terrain.textures()[static_cast<std::size_t>(item.texture.slot)].level;
                 const Square q = square_of(l, item);
                 // One block of cells is the smallest part; a deeper texture cannot be drawn.
-                if (level == d.texture_deepest_level || q.side == 2 || item.tile.level < l.deepest_level) continue;
+                if (level == d.texture_deepest_level || q.side == 2 * l.step(item.tile.level) ||
+                    !w.terrain.is_leaf(item.tile))
+                    continue;
                 if (level != item.tile.level + item.part.level) continue;
                 const TileId own = w.terrain.textures()[static_cast<std::size_t>(item.texture.slot)];
                 for (int quadrant = 0; quadrant < 4; ++quadrant) {
