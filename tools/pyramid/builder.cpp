@@ -383,6 +383,7 @@ Result<BuildReport> build_store(BuildPlan plan, const BuildOptions& options, con
     d.max_height_m = d.height_m(heights->max_n);
     d.height_tiles = heights->tile_count;
     d.present_cells = heights->present_cells;
+    if (heights->coarsest_leaf_level < d.lattice.deepest_level) d.coarsest_leaf_level = heights->coarsest_leaf_level;
 
     TextureStage stage{plan, options, **spool, *quantizer, *heights, **writer, progress, stop};
     auto textures = build_textures(stage);

@@ -84,8 +84,9 @@ Result<void> DeepHeights::sample(std::int64_t i, std::int64_t j, std::int64_t co
     return {};
 }
 
-void set_child(HeightTileHeader& header, int quadrant, const HeightBounds& bounds, bool, int) {
+void set_child(HeightTileHeader& header, int quadrant, const HeightBounds& bounds, bool leaf_above_deepest) {
     header.child_mask = static_cast<std::uint8_t>(header.child_mask | 1 << quadrant);
+    if (leaf_above_deepest) header.leaf_mask = static_cast<std::uint8_t>(header.leaf_mask | 1 << quadrant);
     header.children[static_cast<std::size_t>(quadrant)] = bounds;
 }
 
@@ -156,6 +157,7 @@ Result<BranchSummary> DeepBranches::leaf(TileId id, const Place& place) const {
     const std::int64_t in_base_i = (id.x - (place.base.x << up)) * m, in_base_j = (id.y - (place.base.y << up)) * m;
     BranchSummary summary;
     summary.leaf = true;
+    summary.coarsest_leaf = id.level;
     HeightTile tile;
     if (!place.presence.empty()) {
         tile.presence.resize(static_cast<std::size_t>(m * m));
@@ -238,7 +240,8 @@ Result<BranchSummary> DeepBranches::refined(TileId id, const Place& place) const
         if (!child.exists) continue;
         summary.exists = true;
         existing.push_back(child.bounds);
-        set_child(tile.header, static_cast<int>(q), child.bounds, child.leaf, id.level + 1);
+        set_child(tile.header, static_cast<int>(q), child.bounds, child.leaf && id.level + 1 < lattice_.deepest_level);
+        summary.coarsest_leaf = std::min(summary.coarsest_leaf, child.coarsest_leaf);
         summary.present_cells += child.present_cells;
         summary.min_n = std::min(summary.min_n, child.min_n);
         summary.max_n = std::max(summary.max_n, child.max_n);

@@ -49,6 +49,7 @@ struct AncestorBlock {
 struct BranchSummary {
     bool exists = false;  ///< false: no present cell
     bool leaf = false;
+    int coarsest_leaf = kMaxLevel;  ///< level
     HeightBounds bounds;
     std::array<double, kMaxLevel + 1> ancestor_error{};  ///< by level, of the ancestor's coarsest block over the branch
     std::int64_t present_cells = 0;                      ///< of leaves
@@ -86,8 +87,8 @@ private:
     TileSink sink_;
 };
 
-/// Enters a stored child into its parent's header. `level`: the child's.
-void set_child(HeightTileHeader& header, int quadrant, const HeightBounds& bounds, bool leaf, int level);
+/// Enters a stored child into its parent's header.
+void set_child(HeightTileHeader& header, int quadrant, const HeightBounds& bounds, bool leaf_above_deepest);
 /// A parent's finest level has the error of its children's second: the growth goes on from level to level.
 void let_errors_grow(HeightBounds& bounds, int tile_cells_log2);
 /// Bounds of a tile from its children's, its own samples' range and its coarsest block's error.

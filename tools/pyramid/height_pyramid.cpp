@@ -267,7 +267,9 @@ private:
             const BranchSummary& child = built->quadrant[q];
             if (!child.exists) continue;
             existing.push_back(child.bounds);
-            set_child(tile.header, static_cast<int>(q), child.bounds, child.leaf, id.level + 1);
+            set_child(tile.header, static_cast<int>(q), child.bounds,
+                      child.leaf && id.level + 1 < job_.finest.deepest_level);
+            all.coarsest_leaf = std::min(all.coarsest_leaf, child.coarsest_leaf);
             all.present_cells += child.present_cells;
             all.min_n = std::min(all.min_n, child.min_n);
             all.max_n = std::max(all.max_n, child.max_n);
@@ -295,6 +297,7 @@ private:
             if (!record.exists) continue;
             if (!record.outcome) return record.outcome;
             if (record.branch) {
+                result_.coarsest_leaf_level = std::min(result_.coarsest_leaf_level, record.branch->coarsest_leaf);
                 result_.min_n = std::min(result_.min_n, record.branch->min_n);
                 result_.max_n = std::max(result_.max_n, record.branch->max_n);
                 result_.worst_quantum_error_m =
@@ -337,6 +340,7 @@ private:
             if ((parent.child_mask >> q & 1) != 0) existing.push_back(parent.children[static_cast<std::size_t>(q)]);
         record.bounds = bounds_over(existing, tile.samples, parent.coarsest_error, n_);
         tile.header.child_mask = parent.child_mask;
+        tile.header.leaf_mask = parent.leaf_mask;
         tile.header.own = record.bounds;
         tile.header.children = parent.children;
         record.payload = encode_height_tile(tile, n_, HeightCodec::plane);
@@ -345,12 +349,13 @@ private:
 
     Result<void> store(TileId id, const HeightBounds& bounds, const std::vector<std::uint8_t>& payload, bool leaf) {
         result_.tiles.insert(id);
+        if (leaf) result_.coarsest_leaf_level = std::min(result_.coarsest_leaf_level, id.level);
         if (id.level > 0) {
             LevelBand& band = levels_[static_cast<std::size_t>(id.level - 1)];
             ParentRecord& parent = band.parents[static_cast<std::size_t>(id.x >> 1)];
             const int q = quadrant_of(id);
             parent.child_mask = static_cast<std::uint8_t>(parent.child_mask | (1 << q));
-            if (leaf) parent.leaf_mask = static_cast<std::uint8_t>(parent.leaf_mask | (1 << q));
+            if (leaf && branches_) parent.leaf_mask = static_cast<std::uint8_t>(parent.leaf_mask | (1 << q));
             parent.children[static_cast<std::size_t>(q)] = bounds;
         }
         return put(id, payload);

@@ -33,6 +33,7 @@ struct HeightPyramidResult {
     TileSet tiles;
     std::int64_t tile_count = 0;
     std::int64_t present_cells = 0;
+    int coarsest_leaf_level = kMaxLevel;
     std::int32_t min_n = 0, max_n = 0;  ///< over valid samples
     double worst_quantum_error_m = 0;   ///< over valid samples
 };
