@@ -187,10 +187,15 @@ bool read_axes(PJ_CONTEXT* context, const PJ* crs, Axes& axes) {
     return true;
 }
 
-std::string readable_name(const PJ* crs, const std::string& text) {
-    const char* name = proj_get_name(crs);
-    if (name == nullptr || *name == '\0' || std::string(name) == "unknown") return quoted(text);
-    return name;
+/// The CRS's own name, the registry's, or what was typed.
+std::string readable_name(PJ_CONTEXT* context, const PJ* crs, const std::string& registered_text,
+                          const std::string& typed) {
+    const Object known = registered_text.empty() ? nullptr : proj::create_crs(context, registered_text);
+    for (const PJ* object : {crs, static_cast<const PJ*>(known.get())}) {
+        const char* name = object != nullptr ? proj_get_name(object) : nullptr;
+        if (name != nullptr && *name != '\0' && std::string(name) != "unknown") return quoted(name);
+    }
+    return quoted(typed);
 }
 
 }  // namespace
@@ -222,9 +227,9 @@ Result<Crs> Crs::parse(const std::string& given) {
     if (!geographic) impl->metres_per_unit = axes.unit[0];
     impl->east_north = axes.direction[0] != "west" && axes.direction[1] != "west";
     impl->text = registered(c, crs.get());
+    impl->name = readable_name(c, base.get(), impl->text, text);
     if (impl->text.empty()) impl->text = wkt(c, crs.get());
     if (impl->text.empty()) impl->text = definition;
-    impl->name = readable_name(base.get(), text);
     impl->vertical = vertical_text(c, whole.get());
     return Crs(std::move(impl));
 }

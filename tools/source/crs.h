@@ -92,7 +92,8 @@ struct ChosenCrs {
 /// UTM zone of the box's middle where that keeps within 1.001; else polar stereographic above 60 degrees (true at the
 /// box's middle latitude), else a Lambert conformal conic (parallels 1/6 inside the box), or an equatorial Mercator
 /// where the box straddles the equator too evenly for a cone; the best of what is possible, with its scale stated, when
-/// none keeps within 1.001. Where nothing conformal reaches the whole box (the world), an equidistant cylindrical.
+/// none keeps within 1.001. Where nothing conformal reaches the whole box (the world), an equidistant cylindrical, its
+/// scale stated between latitudes +-89.
 /// Errors: ErrorCode::input for a box that is none.
 Result<ChosenCrs> choose_crs(const Crs* own, const LonLatBox& box);
 

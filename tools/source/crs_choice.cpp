@@ -24,6 +24,11 @@ constexpr double kGoodScale = 1.001;
 /// missed by some 1e-5.
 constexpr int kScaleSteps = 32;
 
+/// What is stretched more is beside a point without an image (the pole of a Mercator): PROJ stops short of infinity.
+constexpr double kGreatestScale = 1000;
+/// Latitudes between which the last resort is measured: at the poles no cylinder has a scale.
+constexpr double kCylinderLatitude = 89;
+
 constexpr double kRadians = std::numbers::pi / 180;
 
 Error refuse_box(const LonLatBox& box, const std::string& why) {
@@ -78,8 +83,8 @@ bool widen(ScaleRange& range, PJ* projection, double longitude, double latitude)
     proj_errno_reset(projection);
     const PJ_COORD place = proj_coord(longitude, latitude, 0, 0);
     const PJ_FACTORS factors = proj_factors(projection, place);
-    const bool fits = proj_errno(projection) == 0 && factors.tissot_semiminor > 0 &&
-                      std::isfinite(factors.tissot_semimajor) &&
+    const bool fits = proj_errno(projection) == 0 && factors.tissot_semiminor > 1 / kGreatestScale &&
+                      factors.tissot_semimajor < kGreatestScale &&
                       std::isfinite(proj_trans(projection, PJ_FWD, place).xy.x);
     if (!fits) return false;
     range.least = std::min(range.least, factors.tissot_semiminor);
@@ -136,9 +141,15 @@ Result<Crs> named_crs(const std::string& name, const std::string& parameters) {
     const Error failed{ErrorCode::input, fmt::format("PROJ does not make \"{}\"", parameters)};
     const Context context = proj::make_context();
     if (!context) return failed;
-    const Object plain = proj::create_crs(context.get(), parameters + " +datum=WGS84 +units=m +type=crs");
-    const Object named(plain ? proj_alter_name(context.get(), plain.get(), name.c_str()) : nullptr);
-    const char* text = named ? proj_as_wkt(context.get(), named.get(), PJ_WKT2_2019, nullptr) : nullptr;
+    PJ_CONTEXT* const c = context.get();
+    const Object plain = proj::create_crs(c, parameters + " +datum=WGS84 +units=m +type=crs");
+    const Object conversion(plain ? proj_crs_get_coordoperation(c, plain.get()) : nullptr);
+    // The registry's own WGS 84, which datum shifts are on record for.
+    const Object base = proj::create_crs(c, "EPSG:4326");
+    const Object metres(proj_create_cartesian_2D_cs(c, PJ_CART2D_EASTING_NORTHING, "metre", 1.0));
+    if (!conversion || !base || !metres) return failed;
+    const Object named(proj_create_projected_crs(c, name.c_str(), base.get(), conversion.get(), metres.get()));
+    const char* text = named ? proj_as_wkt(c, named.get(), PJ_WKT2_2019, nullptr) : nullptr;
     if (text == nullptr) return failed;
     return Crs::parse(text);
 }
@@ -225,7 +236,10 @@ Result<ChosenCrs> choose_crs(const Crs* own, const LonLatBox& given) {
 
     const Candidate last = cylindrical(*box);
     if (!last.crs) return last.crs.error();
-    const Result<ScaleRange> scale = measure_scale(*last.crs, *box);
+    LonLatBox cut = *box;
+    cut.south = std::clamp(cut.south, -kCylinderLatitude, kCylinderLatitude);
+    cut.north = std::clamp(cut.north, -kCylinderLatitude, kCylinderLatitude);
+    const Result<ScaleRange> scale = measure_scale(*last.crs, cut);
     if (!scale) return scale.error();
     return ChosenCrs{*last.crs, fmt::format("{}: {}", last.name, span_text(*box)), *scale};
 }
