@@ -148,14 +148,17 @@ std::string registered(PJ_CONTEXT* context, const PJ* object) {
     return {};
 }
 
-/// One-line WKT2; empty where PROJ has none that says the same.
-std::string wkt(PJ_CONTEXT* context, const PJ* object) {
+std::string plain_wkt(PJ_CONTEXT* context, const PJ* object) {
     const std::array<const char*, 2> options = {"MULTILINE=NO", nullptr};
     const char* text = proj_as_wkt(context, object, PJ_WKT2_2019, options.data());
-    if (text == nullptr) return {};
-    std::string copy = text;
-    const Object again = proj::create_crs(context, copy);
-    return again && proj::equivalent(context, again.get(), object) ? copy : std::string();
+    return text != nullptr ? text : std::string();
+}
+
+/// One-line WKT2; empty where PROJ has none that says the same. Read and written once more: PROJ fills in names then,
+/// and the text of a text should be itself.
+std::string wkt(PJ_CONTEXT* context, const PJ* object) {
+    const Object again = proj::create_crs(context, plain_wkt(context, object));
+    return again && proj::equivalent(context, again.get(), object) ? plain_wkt(context, again.get()) : std::string();
 }
 
 /// The vertical part's number, of a compound CRS that has one.

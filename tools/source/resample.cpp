@@ -319,13 +319,13 @@ std::uint32_t gather(std::uint64_t sums) {
 /// (a sixteenth of a level at most, whatever the contrast) and sum to 1: what is uniform stays what it is.
 bool plain_bilinear(const Samples<std::uint32_t>& samples, const Axis& columns, const Axis& rows, double u, double v,
                     std::uint32_t& out) {
-    const std::int64_t c = columns.pair(u), r = rows.pair(v);
+    const auto u12 = static_cast<std::int64_t>(u * 4096 + 0.5), v12 = static_cast<std::int64_t>(v * 4096 + 0.5);
+    const std::int64_t c = std::min(u12 >> 12, columns.last_pair), r = std::min(v12 >> 12, rows.last_pair);
     const std::uint32_t* above = samples.find(c, r, 2, 2);
     if (above == nullptr) return false;
     const std::uint32_t* below = above + samples.pitch();
     if (alpha_of(above[0] & above[1] & below[0] & below[1]) != 255) return false;
-    const std::uint64_t f = static_cast<std::uint32_t>((u - static_cast<double>(c)) * 4096 + 0.5);
-    const std::uint64_t g = static_cast<std::uint32_t>((v - static_cast<double>(r)) * 4096 + 0.5);
+    const auto f = static_cast<std::uint64_t>(u12 - c * 4096), g = static_cast<std::uint64_t>(v12 - r * 4096);
     const std::uint64_t w11 = (f * g + 2048) >> 12, w10 = f - w11, w01 = g - w11, w00 = 4096 - f - w01;
     out = gather(spread(above[0]) * w00 + spread(above[1]) * w10 + spread(below[0]) * w01 + spread(below[1]) * w11);
     return true;
