@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <mutex>
 #include <numbers>
 #include <utility>
 
@@ -201,10 +203,36 @@ std::string readable_name(PJ_CONTEXT* context, const PJ* crs, const std::string&
     return quoted(typed);
 }
 
+/// What texts said before: a mosaic's thousand files name one CRS, and looking through the registry for what fits a WKT
+/// takes a tenth of a second.
+class Known {
+public:
+    std::shared_ptr<const Crs::Impl> find(const std::string& text) {
+        const std::lock_guard lock(mutex_);
+        const auto found = crs_.find(text);
+        return found != crs_.end() ? found->second : nullptr;
+    }
+    void add(const std::string& text, std::shared_ptr<const Crs::Impl> crs) {
+        const std::lock_guard lock(mutex_);
+        if (crs_.size() < kMost) crs_.emplace(text, std::move(crs));
+    }
+
+private:
+    static constexpr std::size_t kMost = 64;
+    std::mutex mutex_;
+    std::map<std::string, std::shared_ptr<const Crs::Impl>> crs_;
+};
+
+Known& known_crs() {
+    static Known known;
+    return known;
+}
+
 }  // namespace
 
 Result<Crs> Crs::parse(const std::string& given) {
     const std::string text = trimmed(given);
+    if (auto known = known_crs().find(text)) return Crs(std::move(known));
     if (text.size() > kLongestText || text.find('\0') != std::string::npos || !is_definition(text)) {
         return refuse(given, "not a definition; \"EPSG:n\", WKT, PROJJSON or a PROJ string is needed");
     }
@@ -234,6 +262,7 @@ Result<Crs> Crs::parse(const std::string& given) {
     if (impl->text.empty()) impl->text = wkt(c, crs.get());
     if (impl->text.empty()) impl->text = definition;
     impl->vertical = vertical_text(c, whole.get());
+    known_crs().add(text, impl);
     return Crs(std::move(impl));
 }
 

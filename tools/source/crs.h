@@ -14,7 +14,8 @@ namespace scree {
 class Crs {
 public:
     /// "EPSG:n", WKT 1 or 2, PROJJSON or a PROJ string. Of a compound CRS the horizontal part is taken and the vertical
-    /// part kept apart. Errors: ErrorCode::input, quoting the text (cut to 80 characters).
+    /// part kept apart. From any thread; what was parsed once is remembered. Errors: ErrorCode::input, quoting the text
+    /// (cut to 80 characters).
     static Result<Crs> parse(const std::string& text);
 
     const std::string& text() const;      ///< "EPSG:n" where the registry knows it (exactly), else one-line WKT2
