@@ -124,9 +124,10 @@ TEST(CrsTransform, XIsEastWhateverTheAuthoritySays) {
 TEST(CrsTransform, LongitudesMayGoRound) {
     const Point plain = transform("EPSG:4326", "EPSG:32601", {-179, 10});
     const Point round = transform("EPSG:4326", "EPSG:32601", {181, 10});
-    const Point twice = transform("EPSG:4326", "EPSG:32601", {541, 10});
+    const Point twice = transform("EPSG:4326", "EPSG:32601", {901, 10});
     EXPECT_NEAR(plain.x, round.x, 1e-6);
     EXPECT_NEAR(plain.x, twice.x, 1e-6);
+    EXPECT_NEAR(transform("EPSG:4230", "EPSG:4326", {181, 50}).x, -179, 0.01);
     const Point paris = transform("EPSG:4807", "EPSG:2154", {0, 54});
     const Point paris_round = transform("EPSG:4807", "EPSG:2154", {400, 54});
     EXPECT_NEAR(paris.x, paris_round.x, 1e-6);
@@ -216,6 +217,14 @@ TEST(MeasureScale, IsOfLengthsAndNotOfUnits) {
     ASSERT_TRUE(scale.ok());
     EXPECT_NEAR(scale->least, 1, 1e-4);
     EXPECT_NEAR(scale->greatest, 1, 1e-4);
+}
+
+TEST(MeasureScale, LongitudesAreOfGreenwichWhateverTheCrsCountsFrom) {
+    // Austria's western zone lies about 28 degrees east of Ferro.
+    const Result<ScaleRange> scale = measure_scale(crs("EPSG:31281"), {10.32, 47, 10.35, 47.1});
+    ASSERT_TRUE(scale.ok());
+    EXPECT_NEAR(scale->least, 1, 1e-7);
+    EXPECT_NEAR(scale->greatest, 1, 1e-7);
 }
 
 TEST(MeasureScale, WebMercatorGrowsWithLatitude) {

@@ -182,6 +182,23 @@ TEST(Resample, APointIsVoidExactlyWhereItsNearestSampleIs) {
     }
 }
 
+TEST(Resample, CubicIsBilinearWhereOneOfItsSamplesIsVoid) {
+    SCREE_TRACE_SEED();
+    Random random(test::seed());
+    Heights heights(12, 12, [&](double, double) { return real(random, 0, 100); });
+    Colours colours(12, 12, [&](double, double) { return static_cast<std::uint32_t>(random()) | 0xff000000U; });
+    heights.at(5, 5) = kVoid;
+    colours.at(5, 5) = 0;
+    for (const auto& [at, differs] : {std::pair{6.3, false}, std::pair{7.3, true}}) {
+        EXPECT_EQ(sample(heights, heights.rule(Kernel::cubic), at, at) !=
+                      sample(heights, heights.rule(Kernel::bilinear), at, at),
+                  differs);
+        EXPECT_EQ(sample(colours, colours.rule(Kernel::cubic), at, at) !=
+                      sample(colours, colours.rule(Kernel::bilinear), at, at),
+                  differs);
+    }
+}
+
 TEST(Resample, PointRastersEndAtTheirOutermostSamplesAndAreaRastersHalfASampleBeyond) {
     const Heights raster(6, 4, [](double x, double y) { return 1 + x + 10 * y; });
     const Colours colours(
@@ -293,14 +310,14 @@ TEST(Resample, OpaqueColoursAreTheBilinearMeanToWithinRounding) {
 }
 
 TEST(Resample, TransparentPixelsGiveNoColour) {
-    Colours raster(2, 1, [](double, double) { return rgba(200, 100, 50); });
-    raster.at(1, 0) = rgba(0, 255, 0, 0);
+    Colours raster(2, 2, [](double, double) { return rgba(200, 100, 50); });
+    raster.at(1, 0) = raster.at(1, 1) = rgba(0, 255, 0, 0);
     const std::uint32_t near = sample(raster, raster.rule(Kernel::bilinear), 0.25, 0);
     EXPECT_EQ(near, rgba(200, 100, 50, 191));
     EXPECT_EQ(sample(raster, raster.rule(Kernel::bilinear), 0.75, 0), 0U);
     EXPECT_EQ(sample(raster, raster.rule(Kernel::cubic), 0.25, 0), near);
     // Half as opaque, half the weight: (200 + 0.5 * 50) / 1.5.
-    raster.at(1, 0) = rgba(50, 100, 50, 128);
+    raster.at(1, 0) = raster.at(1, 1) = rgba(50, 100, 50, 128);
     EXPECT_NEAR(channel(sample(raster, raster.rule(Kernel::bilinear), 0.5, 0), 0), 150, 1);
 }
 

@@ -219,6 +219,26 @@ TEST(WarpMap, CoarseGridsAroundPolesAndAcrossTheAntimeridianKeepTheBound) {
     }
 }
 
+// About the equator latitude is an odd function of Mercator's northing: right at the ends and in the middle of a chunk.
+TEST(WarpMap, ErrorsThatVanishInTheMiddleOfAChunkAreSeen) {
+    Georeference place;
+    place.first_x = -10;
+    place.first_y = 20;
+    place.column_x = 0.1;
+    place.row_y = -0.1;
+    const TargetGrid grid{0, 32 * 5e4, 5e4};
+    const WarpMap map = make(grid, "EPSG:3857", place, "EPSG:4326", {1000, 400, nullptr});
+    const DirectTransform direct("EPSG:3857", "EPSG:4326");
+    const Mapped got(map, 0, 0, 64, 64);
+    for (std::int64_t j = 0; j < 64; ++j) {
+        for (std::int64_t i = 0; i < 64; ++i) {
+            const std::size_t k = got.index(i, j);
+            const Point want = exact_place(direct, grid, place, true, i, j, {got.column[k], got.row[k]});
+            ASSERT_LE(std::hypot(got.column[k] - want.x, got.row[k] - want.y), kWarpBoundSamples) << i << " " << j;
+        }
+    }
+}
+
 TEST(WarpMap, WhatIsAskedForTogetherDoesNotMatter) {
     SCREE_TRACE_SEED();
     Random random(test::seed());
