@@ -52,20 +52,29 @@ Result<LonLatBox> unrolled(const LonLatBox& box) {
 
 double wrapped(double longitude) { return std::remainder(longitude, 360.0); }
 
-/// From longitude and latitude in radians of the CRS's own datum to metres, in one step without a change of axes or
-/// units: what proj_factors wants. It can make this itself, at each call anew and 20 ms each.
+/// From longitude and latitude in radians on the CRS's ellipsoid to metres, in one step without a change of axes, units
+/// or meridian: what proj_factors wants. It can make this itself, at each call anew and 20 ms each.
 Object metric_projection(PJ_CONTEXT* context, const PJ* crs) {
-    const Object geodetic(proj_crs_get_geodetic_crs(context, crs));
+    const Object ellipsoid(proj_get_ellipsoid(context, crs));
     const Object conversion(proj_crs_get_coordoperation(context, crs));
-    if (!geodetic || !conversion) return nullptr;
-    const Object datum(proj_crs_get_datum_forced(context, geodetic.get()));
-    const Object radians(proj_create_ellipsoidal_2D_cs(context, PJ_ELLPS2D_LONGITUDE_LATITUDE, "Radian", 1.0));
+    double axis_m = 0, inverse_flattening = 0;
+    if (!ellipsoid || !conversion ||
+        proj_ellipsoid_get_parameters(context, ellipsoid.get(), &axis_m, nullptr, nullptr, &inverse_flattening) == 0) {
+        return nullptr;
+    }
+    const auto geographic = [&](const char* unit, double unit_radians) -> Object {
+        const Object system(proj_create_ellipsoidal_2D_cs(context, PJ_ELLPS2D_LONGITUDE_LATITUDE, unit, unit_radians));
+        return Object(system
+                          ? proj_create_geographic_crs(context, "plain", "plain", "plain", axis_m, inverse_flattening,
+                                                       "Greenwich", 0, "Degree", kRadians, system.get())
+                          : nullptr);
+    };
+    // A base in degrees: between radians and radians PROJ puts a step that converts them.
+    const Object from = geographic("Radian", 1), base = geographic("Degree", kRadians);
     const Object metres(proj_create_cartesian_2D_cs(context, PJ_CART2D_EASTING_NORTHING, "metre", 1.0));
-    if (!datum || !radians || !metres) return nullptr;
-    const Object from(proj_create_geographic_crs_from_datum(context, "in radians", datum.get(), radians.get()));
-    const Object to(proj_create_projected_crs(context, "in metres", geodetic.get(), conversion.get(), metres.get()));
-    return from && to ? Object(proj_create_crs_to_crs_from_pj(context, from.get(), to.get(), nullptr, nullptr))
-                      : nullptr;
+    if (!from || !base || !metres) return nullptr;
+    const Object to(proj_create_projected_crs(context, "in metres", base.get(), conversion.get(), metres.get()));
+    return to ? Object(proj_create_crs_to_crs_from_pj(context, from.get(), to.get(), nullptr, nullptr)) : nullptr;
 }
 
 /// Radians east of Greenwich.

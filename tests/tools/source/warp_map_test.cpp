@@ -316,7 +316,7 @@ TEST(WarpMap, RastersLieWhereTheyLieOnWhicheverTurnTheirLongitudesAre) {
             EXPECT_NEAR(got.column[0], 0.3 * 512, 0.02);
             EXPECT_NEAR(got.row[0], 0.5 * 512, 0.02);
             for (std::size_t i = 1; i < 400; ++i) ASSERT_NEAR(got.column[i] - got.column[i - 1], 0.48, 0.02);
-            EXPECT_NEAR(map.shrink_at(207, 0).columns, 0.48, 0.02);
+            for (std::int64_t i = 0; i < 400; ++i) ASSERT_NEAR(map.shrink_at(i, 0).columns, 0.48, 0.02);
         }
     }
 }
