@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <mutex>
 #include <numbers>
 #include <utility>
 
@@ -148,14 +150,17 @@ std::string registered(PJ_CONTEXT* context, const PJ* object) {
     return {};
 }
 
-/// One-line WKT2; empty where PROJ has none that says the same.
-std::string wkt(PJ_CONTEXT* context, const PJ* object) {
+std::string plain_wkt(PJ_CONTEXT* context, const PJ* object) {
     const std::array<const char*, 2> options = {"MULTILINE=NO", nullptr};
     const char* text = proj_as_wkt(context, object, PJ_WKT2_2019, options.data());
-    if (text == nullptr) return {};
-    std::string copy = text;
-    const Object again = proj::create_crs(context, copy);
-    return again && proj::equivalent(context, again.get(), object) ? copy : std::string();
+    return text != nullptr ? text : std::string();
+}
+
+/// One-line WKT2; empty where PROJ has none that says the same. Read and written once more: PROJ fills in names then,
+/// and the text of a text should be itself.
+std::string wkt(PJ_CONTEXT* context, const PJ* object) {
+    const Object again = proj::create_crs(context, plain_wkt(context, object));
+    return again && proj::equivalent(context, again.get(), object) ? plain_wkt(context, again.get()) : std::string();
 }
 
 /// The vertical part's number, of a compound CRS that has one.
@@ -187,16 +192,47 @@ bool read_axes(PJ_CONTEXT* context, const PJ* crs, Axes& axes) {
     return true;
 }
 
-std::string readable_name(const PJ* crs, const std::string& text) {
-    const char* name = proj_get_name(crs);
-    if (name == nullptr || *name == '\0' || std::string(name) == "unknown") return quoted(text);
-    return name;
+/// The CRS's own name, the registry's, or what was typed.
+std::string readable_name(PJ_CONTEXT* context, const PJ* crs, const std::string& registered_text,
+                          const std::string& typed) {
+    const Object known = registered_text.empty() ? nullptr : proj::create_crs(context, registered_text);
+    for (const PJ* object : {crs, static_cast<const PJ*>(known.get())}) {
+        const char* name = object != nullptr ? proj_get_name(object) : nullptr;
+        if (name != nullptr && *name != '\0' && std::string(name) != "unknown") return quoted(name);
+    }
+    return quoted(typed);
+}
+
+/// What texts said before: a mosaic's thousand files name one CRS, and looking through the registry for what fits a WKT
+/// takes a tenth of a second.
+class Known {
+public:
+    std::shared_ptr<const Crs::Impl> find(const std::string& text) {
+        const std::lock_guard lock(mutex_);
+        const auto found = crs_.find(text);
+        return found != crs_.end() ? found->second : nullptr;
+    }
+    void add(const std::string& text, std::shared_ptr<const Crs::Impl> crs) {
+        const std::lock_guard lock(mutex_);
+        if (crs_.size() < kMost) crs_.emplace(text, std::move(crs));
+    }
+
+private:
+    static constexpr std::size_t kMost = 64;
+    std::mutex mutex_;
+    std::map<std::string, std::shared_ptr<const Crs::Impl>> crs_;
+};
+
+Known& known_crs() {
+    static Known known;
+    return known;
 }
 
 }  // namespace
 
 Result<Crs> Crs::parse(const std::string& given) {
     const std::string text = trimmed(given);
+    if (auto known = known_crs().find(text)) return Crs(std::move(known));
     if (text.size() > kLongestText || text.find('\0') != std::string::npos || !is_definition(text)) {
         return refuse(given, "not a definition; \"EPSG:n\", WKT, PROJJSON or a PROJ string is needed");
     }
@@ -222,10 +258,11 @@ Result<Crs> Crs::parse(const std::string& given) {
     if (!geographic) impl->metres_per_unit = axes.unit[0];
     impl->east_north = axes.direction[0] != "west" && axes.direction[1] != "west";
     impl->text = registered(c, crs.get());
+    impl->name = readable_name(c, base.get(), impl->text, text);
     if (impl->text.empty()) impl->text = wkt(c, crs.get());
     if (impl->text.empty()) impl->text = definition;
-    impl->name = readable_name(base.get(), text);
     impl->vertical = vertical_text(c, whole.get());
+    known_crs().add(text, impl);
     return Crs(std::move(impl));
 }
 

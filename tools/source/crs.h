@@ -14,7 +14,8 @@ namespace scree {
 class Crs {
 public:
     /// "EPSG:n", WKT 1 or 2, PROJJSON or a PROJ string. Of a compound CRS the horizontal part is taken and the vertical
-    /// part kept apart. Errors: ErrorCode::input, quoting the text (cut to 80 characters).
+    /// part kept apart. From any thread; what was parsed once is remembered. Errors: ErrorCode::input, quoting the text
+    /// (cut to 80 characters).
     static Result<Crs> parse(const std::string& text);
 
     /// That of files which name none: metres of their own, the same as itself and nothing else.
@@ -95,7 +96,8 @@ struct ChosenCrs {
 /// UTM zone of the box's middle where that keeps within 1.001; else polar stereographic above 60 degrees (true at the
 /// box's middle latitude), else a Lambert conformal conic (parallels 1/6 inside the box), or an equatorial Mercator
 /// where the box straddles the equator too evenly for a cone; the best of what is possible, with its scale stated, when
-/// none keeps within 1.001. Where nothing conformal reaches the whole box (the world), an equidistant cylindrical.
+/// none keeps within 1.001. Where nothing conformal reaches the whole box (the world), an equidistant cylindrical, its
+/// scale stated between latitudes +-89.
 /// Errors: ErrorCode::input for a box that is none.
 Result<ChosenCrs> choose_crs(const Crs* own, const LonLatBox& box);
 

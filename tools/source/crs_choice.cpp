@@ -24,6 +24,11 @@ constexpr double kGoodScale = 1.001;
 /// missed by some 1e-5.
 constexpr int kScaleSteps = 32;
 
+/// What is stretched more is beside a point without an image (the pole of a Mercator): PROJ stops short of infinity.
+constexpr double kGreatestScale = 1000;
+/// Latitudes between which the last resort is measured: at the poles no cylinder has a scale.
+constexpr double kCylinderLatitude = 89;
+
 constexpr double kRadians = std::numbers::pi / 180;
 
 Error refuse_box(const LonLatBox& box, const std::string& why) {
@@ -47,20 +52,29 @@ Result<LonLatBox> unrolled(const LonLatBox& box) {
 
 double wrapped(double longitude) { return std::remainder(longitude, 360.0); }
 
-/// From longitude and latitude in radians of the CRS's own datum to metres, in one step without a change of axes or
-/// units: what proj_factors wants. It can make this itself, at each call anew and 20 ms each.
+/// From longitude and latitude in radians on the CRS's ellipsoid to metres, in one step without a change of axes, units
+/// or meridian: what proj_factors wants. It can make this itself, at each call anew and 20 ms each.
 Object metric_projection(PJ_CONTEXT* context, const PJ* crs) {
-    const Object geodetic(proj_crs_get_geodetic_crs(context, crs));
+    const Object ellipsoid(proj_get_ellipsoid(context, crs));
     const Object conversion(proj_crs_get_coordoperation(context, crs));
-    if (!geodetic || !conversion) return nullptr;
-    const Object datum(proj_crs_get_datum_forced(context, geodetic.get()));
-    const Object radians(proj_create_ellipsoidal_2D_cs(context, PJ_ELLPS2D_LONGITUDE_LATITUDE, "Radian", 1.0));
+    double axis_m = 0, inverse_flattening = 0;
+    if (!ellipsoid || !conversion ||
+        proj_ellipsoid_get_parameters(context, ellipsoid.get(), &axis_m, nullptr, nullptr, &inverse_flattening) == 0) {
+        return nullptr;
+    }
+    const auto geographic = [&](const char* unit, double unit_radians) -> Object {
+        const Object system(proj_create_ellipsoidal_2D_cs(context, PJ_ELLPS2D_LONGITUDE_LATITUDE, unit, unit_radians));
+        return Object(system
+                          ? proj_create_geographic_crs(context, "plain", "plain", "plain", axis_m, inverse_flattening,
+                                                       "Greenwich", 0, "Degree", kRadians, system.get())
+                          : nullptr);
+    };
+    // A base in degrees: between radians and radians PROJ puts a step that converts them.
+    const Object from = geographic("Radian", 1), base = geographic("Degree", kRadians);
     const Object metres(proj_create_cartesian_2D_cs(context, PJ_CART2D_EASTING_NORTHING, "metre", 1.0));
-    if (!datum || !radians || !metres) return nullptr;
-    const Object from(proj_create_geographic_crs_from_datum(context, "in radians", datum.get(), radians.get()));
-    const Object to(proj_create_projected_crs(context, "in metres", geodetic.get(), conversion.get(), metres.get()));
-    return from && to ? Object(proj_create_crs_to_crs_from_pj(context, from.get(), to.get(), nullptr, nullptr))
-                      : nullptr;
+    if (!from || !base || !metres) return nullptr;
+    const Object to(proj_create_projected_crs(context, "in metres", base.get(), conversion.get(), metres.get()));
+    return to ? Object(proj_create_crs_to_crs_from_pj(context, from.get(), to.get(), nullptr, nullptr)) : nullptr;
 }
 
 /// Radians east of Greenwich.
@@ -78,8 +92,8 @@ bool widen(ScaleRange& range, PJ* projection, double longitude, double latitude)
     proj_errno_reset(projection);
     const PJ_COORD place = proj_coord(longitude, latitude, 0, 0);
     const PJ_FACTORS factors = proj_factors(projection, place);
-    const bool fits = proj_errno(projection) == 0 && factors.tissot_semiminor > 0 &&
-                      std::isfinite(factors.tissot_semimajor) &&
+    const bool fits = proj_errno(projection) == 0 && factors.tissot_semiminor > 1 / kGreatestScale &&
+                      factors.tissot_semimajor < kGreatestScale &&
                       std::isfinite(proj_trans(projection, PJ_FWD, place).xy.x);
     if (!fits) return false;
     range.least = std::min(range.least, factors.tissot_semiminor);
@@ -136,9 +150,15 @@ Result<Crs> named_crs(const std::string& name, const std::string& parameters) {
     const Error failed{ErrorCode::input, fmt::format("PROJ does not make \"{}\"", parameters)};
     const Context context = proj::make_context();
     if (!context) return failed;
-    const Object plain = proj::create_crs(context.get(), parameters + " +datum=WGS84 +units=m +type=crs");
-    const Object named(plain ? proj_alter_name(context.get(), plain.get(), name.c_str()) : nullptr);
-    const char* text = named ? proj_as_wkt(context.get(), named.get(), PJ_WKT2_2019, nullptr) : nullptr;
+    PJ_CONTEXT* const c = context.get();
+    const Object plain = proj::create_crs(c, parameters + " +datum=WGS84 +units=m +type=crs");
+    const Object conversion(plain ? proj_crs_get_coordoperation(c, plain.get()) : nullptr);
+    // The registry's own WGS 84, which datum shifts are on record for.
+    const Object base = proj::create_crs(c, "EPSG:4326");
+    const Object metres(proj_create_cartesian_2D_cs(c, PJ_CART2D_EASTING_NORTHING, "metre", 1.0));
+    if (!conversion || !base || !metres) return failed;
+    const Object named(proj_create_projected_crs(c, name.c_str(), base.get(), conversion.get(), metres.get()));
+    const char* text = named ? proj_as_wkt(c, named.get(), PJ_WKT2_2019, nullptr) : nullptr;
     if (text == nullptr) return failed;
     return Crs::parse(text);
 }
@@ -225,7 +245,10 @@ Result<ChosenCrs> choose_crs(const Crs* own, const LonLatBox& given) {
 
     const Candidate last = cylindrical(*box);
     if (!last.crs) return last.crs.error();
-    const Result<ScaleRange> scale = measure_scale(*last.crs, *box);
+    LonLatBox cut = *box;
+    cut.south = std::clamp(cut.south, -kCylinderLatitude, kCylinderLatitude);
+    cut.north = std::clamp(cut.north, -kCylinderLatitude, kCylinderLatitude);
+    const Result<ScaleRange> scale = measure_scale(*last.crs, cut);
     if (!scale) return scale.error();
     return ChosenCrs{*last.crs, fmt::format("{}: {}", last.name, span_text(*box)), *scale};
 }

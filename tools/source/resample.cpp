@@ -18,45 +18,71 @@ constexpr double kNarrowBox = 1e-3;
 
 /// Columns or rows of a raster.
 struct Axis {
-    double low = 0, high = -1;  ///< where points may be
-    double last = 0;            ///< the outermost sample
+    double low = 0, high = -1;   ///< where points may be
+    double end = 0;              ///< the outermost sample
+    std::int64_t last = 0;       ///< the same
+    std::int64_t last_pair = 0;  ///< the one before it, if there is one
 
     Axis(std::int64_t size, bool half_sample_rim) {
         if (size <= 0) return;
+        last = size - 1;
+        last_pair = std::max<std::int64_t>(last - 1, 0);
+        end = static_cast<double>(last);
         const double rim = (half_sample_rim ? 0.5 : 0.0) + kOutsideTolerance;
-        last = static_cast<double>(size - 1);
         low = -rim;
-        high = last + rim;
+        high = end + rim;
     }
     bool holds(double u) const { return u >= low && u <= high; }  // false for NaN
-    double onto(double u) const { return std::clamp(u, 0.0, last); }
-    std::int64_t nearest(double u) const { return static_cast<std::int64_t>(std::min(std::floor(u + 0.5), last)); }
-    /// The first of the two samples that u lies between; at the last sample the pair before it, which it ends.
-    std::int64_t pair(double u) const {
-        return std::max<std::int64_t>(0, std::min(static_cast<std::int64_t>(u), static_cast<std::int64_t>(last) - 1));
-    }
+    double onto(double u) const { return u < 0 ? 0 : u > end ? end : u; }
+    /// Of u in the raster: truncation rounds down.
+    std::int64_t nearest(double u) const { return std::min(static_cast<std::int64_t>(u + 0.5), last); }
+    /// The first of the two samples that u lies between; at the last sample the pair that ends with it.
+    std::int64_t pair(double u) const { return std::min(static_cast<std::int64_t>(u), last_pair); }
 };
 
-/// Samples first, first + 1... and their weights, whose sum is 1 but for what a box loses outside the raster.
+/// Samples first, first + 1... and their weights; those at the ends are not 0.
 struct Taps {
     std::int64_t first = 0;
-    std::vector<double> weights;
+    std::vector<double> weights;  ///< longer than `count` after a wider one
+    std::size_t count = 0;
+
+    void start(std::int64_t at) {
+        first = at;
+        count = 0;
+    }
+    void add(double weight) {
+        if (count == 0 && weight == 0) {
+            ++first;
+            return;
+        }
+        if (count == weights.size()) weights.resize(2 * count + 8);
+        weights[count++] = weight;
+    }
+    void end() {
+        while (count > 0 && weights[count - 1] == 0) --count;
+    }
 };
 
 void set_linear(Taps& taps, const Axis& axis, double u) {
-    taps.first = axis.pair(u);
-    const double f = u - static_cast<double>(taps.first);
-    taps.weights.assign({1 - f, f});
-    if (axis.last == 0) taps.weights.assign({1.0});
+    const std::int64_t pair = axis.pair(u);
+    const double f = u - static_cast<double>(pair);
+    taps.start(pair);
+    taps.add(1 - f);
+    taps.add(f);
+    taps.end();
 }
 
 /// Keys 1981, equation 4: a = -1/2.
 void set_cubic(Taps& taps, const Axis& axis, double u) {
     const std::int64_t pair = axis.pair(u);
-    if (pair < 1 || static_cast<double>(pair + 2) > axis.last) return set_linear(taps, axis, u);
+    if (pair < 1 || pair + 2 > axis.last) return set_linear(taps, axis, u);
     const double f = u - static_cast<double>(pair), g = 1 - f;
-    taps.first = pair - 1;
-    taps.weights.assign({-0.5 * f * g * g, 1 + f * f * (1.5 * f - 2.5), 1 + g * g * (1.5 * g - 2.5), -0.5 * g * f * f});
+    taps.start(pair - 1);
+    taps.add(-0.5 * f * g * g);
+    taps.add(1 + f * f * (1.5 * f - 2.5));
+    taps.add(1 + g * g * (1.5 * g - 2.5));
+    taps.add(-0.5 * g * f * f);
+    taps.end();
 }
 
 /// The integral of a sample's hat (1 at the sample, 0 at its neighbours) up to x from the sample.
@@ -71,27 +97,28 @@ double area_up_to(double x) { return std::clamp(x + 0.5, 0.0, 1.0); }
 
 template <class UpTo>
 void set_mean(Taps& taps, double low, double high, std::int64_t first, std::int64_t last, UpTo up_to) {
-    taps.first = first;
-    taps.weights.clear();
+    const double scale = 1 / (high - low);
+    taps.start(first);
     for (std::int64_t c = first; c <= last; ++c) {
         const double at = static_cast<double>(c);
-        taps.weights.push_back((up_to(high - at) - up_to(low - at)) / (high - low));
+        taps.add((up_to(high - at) - up_to(low - at)) * scale);
     }
+    taps.end();
 }
 
 /// The mean of the linear interpolant over a box about u. Towards the raster's edge the box shrinks on both sides, or
 /// slopes would be pulled inward.
 void set_surface_mean(Taps& taps, const Axis& axis, double u, double shrink) {
     const double width = shrink < 2 ? 2 * (shrink - 1) : shrink;
-    const double half = std::min({width / 2, u, axis.last - u});
+    const double half = std::min({width / 2, u, axis.end - u});
     if (half < kNarrowBox) return set_linear(taps, axis, u);
-    set_mean(taps, u - half, u + half, static_cast<std::int64_t>(std::floor(u - half)),
-             static_cast<std::int64_t>(std::min(std::ceil(u + half), axis.last)), hat_up_to);
+    const double low = std::max(u - half, 0.0), high = std::min(u + half, axis.end);
+    set_mean(taps, low, high, static_cast<std::int64_t>(low), axis.pair(high) + 1, hat_up_to);
 }
 
 /// The mean of pixels over the part of a box about u that lies in the raster.
 void set_area_mean(Taps& taps, const Axis& axis, double u, double shrink) {
-    const double low = std::max(u - shrink / 2, -0.5), high = std::min(u + shrink / 2, axis.last + 0.5);
+    const double low = std::max(u - shrink / 2, -0.5), high = std::min(u + shrink / 2, axis.end + 0.5);
     set_mean(taps, low, high, axis.nearest(low), axis.nearest(high), area_up_to);
 }
 
@@ -124,17 +151,18 @@ public:
     }
     std::ptrdiff_t pitch() const { return static_cast<std::ptrdiff_t>(window_.columns); }
 
-    /// visit(sample, weight) for all that weigh something.
+    /// visit(sample, weight) for all taps, row by row.
     template <class Visit>
     void each(const Taps& columns, const Taps& rows, Visit visit) const {
-        const auto count = static_cast<std::int64_t>(columns.weights.size());
-        for (std::size_t r = 0; r < rows.weights.size(); ++r) {
+        const auto count = static_cast<std::int64_t>(columns.count);
+        const double* const weights = columns.weights.data();
+        for (std::size_t r = 0; r < rows.count; ++r) {
             const std::int64_t row = rows.first + static_cast<std::int64_t>(r);
-            const T* line = find(columns.first, row, count, 1);
-            for (std::int64_t c = 0; c < count; ++c) {
-                const double weight = rows.weights[r] * columns.weights[static_cast<std::size_t>(c)];
-                if (weight == 0) continue;
-                visit(line != nullptr ? line[c] : at(columns.first + c, row), weight);
+            const double row_weight = rows.weights[r];
+            if (const T* line = find(columns.first, row, count, 1)) {
+                for (std::int64_t c = 0; c < count; ++c) visit(line[c], row_weight * weights[c]);
+            } else {
+                for (std::int64_t c = 0; c < count; ++c) visit(at(columns.first + c, row), row_weight * weights[c]);
             }
         }
     }
@@ -169,12 +197,10 @@ struct HeightMean {
     bool void_met = false;
 
     void operator()(double z, double w) {
-        if (z == z) {
-            sum += w * z;
-            weight += w;
-        } else {
-            void_met = true;
-        }
+        const bool valid = z == z;
+        sum += valid ? w * z : 0;
+        weight += valid ? w : 0;
+        void_met |= !valid;
     }
 };
 
@@ -275,34 +301,33 @@ std::uint32_t colour_at(Sampler& sampler, const Samples<std::uint32_t>& samples,
     return mean.alpha > 0 && mean.weight > 0 ? mean.rgba() : nearest;
 }
 
-/// Red and blue, 32 bits apart: room for weights of 16 bits.
-std::uint64_t even_channels(std::uint32_t rgba) {
-    return (rgba & 255) | (static_cast<std::uint64_t>(rgba & 0xff0000) << 16);
-}
-std::uint64_t odd_channels(std::uint32_t rgba) { return even_channels(rgba >> 8); }
-
-std::uint32_t rounded_channels(std::uint64_t sums) {
-    sums += 0x0000800000008000;
-    return static_cast<std::uint32_t>((sums >> 16 & 255) | (sums >> 32 & 0xff0000));
+/// Red, green and blue, 21 bits apart: room for sums with weights of 12 bits.
+std::uint64_t spread(std::uint32_t rgba) {
+    const std::uint64_t wide = rgba;
+    return (wide & 0xff) | (wide & 0xff00) << 13 | (wide & 0xff0000) << 26;
 }
 
-/// Between four opaque pixels, in integers; false where one is not opaque or missing. Weights are multiples of 2^-16
-/// and sum to 1: what is uniform stays what it is.
+/// The spread sums' channels, divided by 2^12 and rounded, and opaque.
+std::uint32_t gather(std::uint64_t sums) {
+    constexpr std::uint64_t kHalf = 2048;
+    sums += kHalf | kHalf << 21 | kHalf << 42;
+    return static_cast<std::uint32_t>((sums >> 12 & 0xff) | (sums >> 25 & 0xff00) | (sums >> 38 & 0xff0000)) |
+           0xff000000;
+}
+
+/// Between four opaque pixels, in integers; false where one is not opaque or missing. Weights are multiples of 2^-12
+/// (a sixteenth of a level at most, whatever the contrast) and sum to 1: what is uniform stays what it is.
 bool plain_bilinear(const Samples<std::uint32_t>& samples, const Axis& columns, const Axis& rows, double u, double v,
                     std::uint32_t& out) {
-    const std::int64_t c = columns.pair(u), r = rows.pair(v);
+    const auto u12 = static_cast<std::int64_t>(u * 4096 + 0.5), v12 = static_cast<std::int64_t>(v * 4096 + 0.5);
+    const std::int64_t c = std::min(u12 >> 12, columns.last_pair), r = std::min(v12 >> 12, rows.last_pair);
     const std::uint32_t* above = samples.find(c, r, 2, 2);
     if (above == nullptr) return false;
     const std::uint32_t* below = above + samples.pitch();
     if (alpha_of(above[0] & above[1] & below[0] & below[1]) != 255) return false;
-    const auto f = static_cast<std::uint64_t>((u - static_cast<double>(c)) * 65536 + 0.5);
-    const auto g = static_cast<std::uint64_t>((v - static_cast<double>(r)) * 65536 + 0.5);
-    const std::uint64_t w11 = (f * g + 32768) >> 16, w10 = f - w11, w01 = g - w11, w00 = 65536 - f - w01;
-    out = rounded_channels(even_channels(above[0]) * w00 + even_channels(above[1]) * w10 +
-                           even_channels(below[0]) * w01 + even_channels(below[1]) * w11) |
-          rounded_channels(odd_channels(above[0]) * w00 + odd_channels(above[1]) * w10 + odd_channels(below[0]) * w01 +
-                           odd_channels(below[1]) * w11)
-              << 8;
+    const auto f = static_cast<std::uint64_t>(u12 - c * 4096), g = static_cast<std::uint64_t>(v12 - r * 4096);
+    const std::uint64_t w11 = (f * g + 2048) >> 12, w10 = f - w11, w01 = g - w11, w00 = 4096 - f - w01;
+    out = gather(spread(above[0]) * w00 + spread(above[1]) * w10 + spread(below[0]) * w01 + spread(below[1]) * w11);
     return true;
 }
 
