@@ -17,6 +17,7 @@
 #include <fmt/format.h>
 #include <tiffio.h>
 
+#include "tools/source/gdal_metadata.h"
 #include "tools/source/number_text.h"
 #include "tools/source/tiff_file.h"
 
@@ -25,6 +26,7 @@ namespace {
 
 constexpr std::int64_t kMaxSide = std::int64_t{1} << 30;  // the lattice has no more cells a side
 constexpr int kMaxChannels = 1024;
+constexpr std::uint32_t kGdalMetadataTag = 42112;
 constexpr std::uint32_t kGdalNodataTag = 42113;
 constexpr std::size_t kSniffBytes = 64;
 constexpr int kMaxDirectories = 256;  // of a TIFF, searched for a mask; more are pages of something else
@@ -249,23 +251,17 @@ Result<void> read_tiff_directory(const std::string& path, TIFF* file, ImageHeade
     return read_tiff_layout(path, file, header);
 }
 
-void read_tiff_nodata(TIFF* file, ImageHeader& header) {
-    const TIFFField* field = TIFFFindField(file, kGdalNodataTag, TIFF_ASCII);
-    if (field == nullptr) return;
-    const char* text = nullptr;
-    if (TIFFFieldPassCount(field) != 0) {
-        std::uint32_t count = 0;
-        if (TIFFGetField(file, kGdalNodataTag, &count, &text) == 1 && text != nullptr)
-            header.nodata = std::string(text, count);
-    } else if (TIFFGetField(file, kGdalNodataTag, &text) == 1 && text != nullptr) {
-        header.nodata = text;
-    }
+void read_gdal_tags(TIFF* file, ImageHeader& header) {
+    if (const std::string nodata = text_tag(file, kGdalNodataTag); !nodata.empty()) header.nodata = nodata;
+    const GdalBandMetadata band = parse_gdal_metadata(text_tag(file, kGdalMetadataTag));
+    header.value_scale = band.scale;
+    header.value_offset = band.offset;
 }
 
 Result<void> read_tiff_header(const std::string& path, ImageHeader& header) {
     TiffFile tiff(path, "rm");
     if (!tiff.valid()) return unusable(path, fmt::format("not a readable TIFF ({})", tiff.messages()));
-    read_tiff_nodata(tiff.get(), header);
+    read_gdal_tags(tiff.get(), header);
     return read_tiff_directory(path, tiff.get(), header);
 }
 

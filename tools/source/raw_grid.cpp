@@ -159,10 +159,8 @@ void lay_out(Interleave interleave, std::int64_t file_bytes, HeaderReader& heade
             break;
         case Interleave::sequential:
             s.pixel_bytes = sample;
-            s.row_bytes = header.count("bandrowbytes", band_row, file_bytes, band_row);
-            s.channel_bytes = saturating_product(s.row_bytes, s.height);
-            if (s.channel_bytes > file_bytes)
-                return header.complain(fmt::format("rows of {} bytes do not fit into the file", s.row_bytes));
+            s.row_bytes = band_row;
+            s.channel_bytes = band_row * s.height;
             s.channel_bytes += header.count("bandgapbytes", 0, file_bytes, 0);
             break;
     }

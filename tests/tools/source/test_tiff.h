@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <tiffio.h>
@@ -43,12 +44,18 @@ struct TestTiff {
     int vertical = 0;
     int linear_unit = 0;
     const char* citation = nullptr;
+    std::vector<double> intergraph_matrix;
+    std::vector<std::pair<int, int>> short_keys;
+    std::vector<std::pair<int, double>> double_keys;
+    std::string gdal_metadata;
 };
 
-inline void add_nodata_tag(TIFF* file) {
-    static char name[] = "GDALNoDataValue";
-    static const TIFFFieldInfo kInfo[] = {{42113, -1, -1, TIFF_ASCII, FIELD_CUSTOM, 1, 0, name}};
-    TIFFMergeFieldInfo(file, kInfo, 1);
+inline void add_gdal_tags(TIFF* file) {
+    static char metadata[] = "GDALMetadata";
+    static char nodata[] = "GDALNoDataValue";
+    static const TIFFFieldInfo kInfo[] = {{42112, -1, -1, TIFF_ASCII, FIELD_CUSTOM, 1, 0, metadata},
+                                          {42113, -1, -1, TIFF_ASCII, FIELD_CUSTOM, 1, 0, nodata}};
+    TIFFMergeFieldInfo(file, kInfo, 2);
 }
 
 /// `samples` are row-major, interleaved, in the file's own type.
@@ -73,10 +80,12 @@ inline bool write_tiff(const std::string& path, const TestTiff& t, const void* s
     } else {
         TIFFSetField(file, TIFFTAG_ROWSPERSTRIP, t.rows_per_strip);
     }
-    if (t.nodata != nullptr) {
-        add_nodata_tag(file);
-        TIFFSetField(file, 42113, t.nodata);
-    }
+    add_gdal_tags(file);
+    if (t.nodata != nullptr) TIFFSetField(file, 42113, t.nodata);
+    if (!t.gdal_metadata.empty()) TIFFSetField(file, 42112, t.gdal_metadata.c_str());
+    if (!t.intergraph_matrix.empty())
+        TIFFSetField(file, TIFFTAG_INTERGRAPH_MATRIX, static_cast<int>(t.intergraph_matrix.size()),
+                     t.intergraph_matrix.data());
     if (!t.scale.empty()) TIFFSetField(file, TIFFTAG_GEOPIXELSCALE, static_cast<int>(t.scale.size()), t.scale.data());
     if (!t.tie_points.empty())
         TIFFSetField(file, TIFFTAG_GEOTIEPOINTS, static_cast<int>(t.tie_points.size()), t.tie_points.data());
@@ -91,6 +100,10 @@ inline bool write_tiff(const std::string& path, const TestTiff& t, const void* s
         if (t.vertical != 0) GTIFKeySet(keys, VerticalCSTypeGeoKey, TYPE_SHORT, 1, t.vertical);
         if (t.linear_unit != 0) GTIFKeySet(keys, ProjLinearUnitsGeoKey, TYPE_SHORT, 1, t.linear_unit);
         if (t.citation != nullptr) GTIFKeySet(keys, GTCitationGeoKey, TYPE_ASCII, 0, t.citation);
+        for (const auto& [key, value] : t.short_keys)
+            GTIFKeySet(keys, static_cast<geokey_t>(key), TYPE_SHORT, 1, value);
+        for (const auto& [key, value] : t.double_keys)
+            GTIFKeySet(keys, static_cast<geokey_t>(key), TYPE_DOUBLE, 1, value);
         GTIFWriteKeys(keys);
         GTIFFree(keys);
     }
