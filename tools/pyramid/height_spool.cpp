@@ -44,14 +44,18 @@ Result<void> read_at(int fd, const std::string& path, std::span<std::uint8_t> by
     return {};
 }
 
+// +infinity is a void too.
+double as_stored(double v) { return v == INFINITY ? kVoidSample : v; }
+
 void encode(std::span<const double> values, bool wide, std::uint8_t* bytes) {
-    if (wide) {
-        std::memcpy(bytes, values.data(), values.size_bytes());
-        return;
-    }
     for (std::size_t i = 0; i < values.size(); ++i) {
-        const float v = static_cast<float>(values[i]);
-        std::memcpy(bytes + i * 4, &v, 4);
+        const double value = as_stored(values[i]);
+        if (wide) {
+            std::memcpy(bytes + i * 8, &value, 8);
+        } else {
+            const float v = static_cast<float>(value);
+            std::memcpy(bytes + i * 4, &v, 4);
+        }
     }
 }
 
