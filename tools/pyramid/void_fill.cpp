@@ -13,6 +13,8 @@ namespace scree {
 namespace {
 
 constexpr std::int64_t kMostCachedRows = 128;  // windows of more rows are read and written for themselves
+constexpr std::int64_t kQuickVoid = std::int64_t{1}
+                                    << 14;  // samples, filled within milliseconds: nobody waits to stop it
 
 // Rows of the spool, row j in slot j modulo their number: most voids are small and many lie side by side, and a row is
 // read and written once for all of them.
@@ -143,7 +145,7 @@ void VoidFiller::leave(const VoidRegion& region) {
 }
 
 Result<void> VoidFiller::fill(const VoidRegion& region) {
-    if (region.voids > 1 << 14 && stopped()) return interrupted();
+    if (region.voids > kQuickVoid && stopped()) return interrupted();
     if (auto ok = read_window(region); !ok) return ok;
     mark(region);
     if (auto ok = choose_values(region); !ok) return ok;
@@ -155,6 +157,8 @@ Result<void> VoidFiller::fill(const VoidRegion& region) {
 
 Result<void> VoidFiller::read_window(const VoidRegion& region) {
     const auto width = static_cast<std::size_t>(region.window_width());
+    values_.reserve(kMaxFillWindowSamples);  // once, lest growing holds two; pages that are not used cost nothing
+    unknown_.reserve(kMaxFillWindowSamples);
     values_.resize(width * static_cast<std::size_t>(region.window_height()));
     if (!is_cached(region))
         if (auto ok = cache_.flush(); !ok) return ok;
@@ -195,7 +199,9 @@ void VoidFiller::mark(const VoidRegion& region) {
 Result<void> VoidFiller::choose_values(const VoidRegion& region) {
     double low = rule_.value, high = rule_.value;
     if (rule_.kind == FillRule::Kind::smooth) {
-        if (!membrane_.solve({values_, unknown_, region.window_width(), region.window_height()}, keep_going_))
+        const std::function<bool()> never_stop;
+        if (!membrane_.solve({values_, unknown_, region.window_width(), region.window_height()},
+                             region.voids > kQuickVoid ? keep_going_ : never_stop))
             return interrupted();
         low = membrane_.rim().low;
         high = membrane_.rim().high;

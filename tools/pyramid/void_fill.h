@@ -11,9 +11,9 @@
 
 namespace scree {
 
-/// Regions in windows (bounding box and rim) above this stay absent. More would hide more and need more memory: 15
-/// bytes a sample while a membrane is solved, and up to 6 more while the region is searched, 84 MiB in all. Not derived
-/// from
+/// Regions in windows (bounding box and rim) above this stay absent. More would hide more and need more memory: 19
+/// bytes a sample while a membrane is solved, and up to 6 more while the region is searched, 100 MiB in all. Not
+/// derived from
 /// --memory, because the store must not depend on that.
 inline constexpr std::int64_t kMaxFillWindowSamples = std::int64_t{1} << 22;  // 2048 x 2048
 
@@ -40,7 +40,8 @@ struct FillReport {
 };
 
 /// After spool.finish(). `memory_bytes` bounds what is held besides the window of one region: rows that are read once
-/// instead of many times. keep_going is asked every few rows and cycles; when it says no: ErrorCode::interrupted. Does
+/// instead of many times. keep_going is asked every few
+/// rows and large cycles; when it says no: ErrorCode::interrupted. Does
 /// nothing for Kind::none, and reads no row where no sample is missing.
 Result<FillReport> fill_interior_voids(HeightSpool& spool, const FillRule& rule, std::int64_t memory_bytes,
                                        const std::function<bool()>& keep_going);
