@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <mutex>
@@ -48,6 +49,14 @@ struct SurfacePlace {
     double u = 0, v = 0;
 };
 
+// At most four, where lines cross.
+struct SurfacePlaces {
+    std::array<SurfacePlace, 4> all;
+    std::size_t count = 0;
+    const SurfacePlace* begin() const { return all.data(); }
+    const SurfacePlace* end() const { return all.data() + count; }
+};
+
 struct PointBox {
     std::int64_t i0 = std::numeric_limits<std::int64_t>::max(), j0 = i0, i1 = -1, j1 = -1;  // points, ends included
 
@@ -72,8 +81,8 @@ public:
     int levels() const { return lattice_.deepest_level + 1 - base_level_; }
 
     /// The cells at a place: several where it is on a line between them.
-    std::vector<SurfacePlace> places_at(double i, double j) const {
-        std::vector<SurfacePlace> places;
+    SurfacePlaces places_at(double i, double j) const {
+        SurfacePlaces places;
         for (const double sj : {kOnLine, -kOnLine})
             for (const double si : {kOnLine, -kOnLine}) {
                 const double at_i = i + si, at_j = j + sj;
@@ -89,7 +98,7 @@ public:
                 if (known != places.end()) continue;
                 p.u = std::clamp(std::ldexp(i, -shift) - static_cast<double>(p.ci), 0.0, 1.0);
                 p.v = std::clamp(std::ldexp(j, -shift) - static_cast<double>(p.cj), 0.0, 1.0);
-                places.push_back(p);
+                places.all[places.count++] = p;
             }
         return places;
     }
@@ -184,7 +193,7 @@ public:
 
 private:
     struct Truth {
-        std::vector<SurfacePlace> places;
+        SurfacePlaces places;
         double height_m;
     };
 
@@ -264,8 +273,8 @@ private:
                 const PlanePoint at =
                     window->position(static_cast<double>(area.column + c), static_cast<double>(area.row + r));
                 auto places = surface_.places_at(l.i_of(at.x), l.j_of(at.y));
-                if (places.empty()) continue;
-                truths.push_back({std::move(places), job_.raw_values ? job_.quantizer.metres(values[k]) : values[k]});
+                if (places.count == 0) continue;
+                truths.push_back({places, job_.raw_values ? job_.quantizer.metres(values[k]) : values[k]});
             }
         return truths;
     }
