@@ -102,11 +102,16 @@ int run_build(int argc, char** argv) {
         note("{}: {:.1f} MB, {} height tiles, {} texture tiles; {:.1f} s, {:.1f} CPU s, peak {} MiB\n", options.out,
              static_cast<double>(report->store_bytes) / 1e6, report->height_tiles, report->texture_tiles,
              report->seconds, report->cpu_seconds, report->peak_rss_bytes >> 20);
+    if (!options.quiet && report->warp_error_m > 0)
+        note("resampling moved heights by {:.3f} m at most, {:.3f} m root mean square\n", report->warp_error_m,
+             report->warp_rms_m);
     if (json.empty()) return 0;
     const nlohmann::ordered_json out = {{"seconds", report->seconds},
                                         {"cpu_seconds", report->cpu_seconds},
                                         {"peak_rss_bytes", report->peak_rss_bytes},
                                         {"source_megapixels", report->source_megapixels},
+                                        {"warp_error_m", report->warp_error_m},
+                                        {"warp_rms_m", report->warp_rms_m},
                                         {"height_tiles", report->height_tiles},
                                         {"texture_tiles", report->texture_tiles},
                                         {"store_bytes", report->store_bytes}};

@@ -272,21 +272,31 @@ Result<void> lay_file(const PlacedFile& file, const LayerMember& place, RasterSp
 template <class T>
 class HeightReader {
 public:
-    HeightReader(ImageSource& dem, const Georeference& where, const HeightReading& reading, bool raw)
-        : dem_(dem), voids_(dem.info(), reading), units_(raw ? HeightUnits{} : units_of(dem.info(), where, reading)) {}
+    HeightReader(ImageSource& dem, const PlacedFile& file, const HeightReading& reading, bool raw)
+        : dem_(dem),
+          path_(file.path),
+          voids_(dem.info(), reading),
+          units_(raw ? HeightUnits{} : units_of(dem.info(), file.where, reading)) {}
 
     Result<void> operator()(std::int64_t begin, std::int64_t end, std::span<T> out) {
         values_.resize(out.size());
         if (auto ok = dem_.read_channel(begin, end, std::span<double>(values_)); !ok) return ok;
         voids_.apply(values_);
         if (units_ != HeightUnits{})
-            for (double& v : values_) v = v * units_.scale + units_.offset_m;
+            for (double& v : values_) {
+                const double raw = v;
+                v = v * units_.scale + units_.offset_m;
+                if (std::isinf(v))
+                    return Error{ErrorCode::input, fmt::format("{}: value {} times its scale {} is no finite height",
+                                                               path_, raw, units_.scale)};
+            }
         std::transform(values_.begin(), values_.end(), out.begin(), [](double v) { return static_cast<T>(v); });
         return {};
     }
 
 private:
     ImageSource& dem_;
+    std::string path_;
     VoidRule voids_;
     HeightUnits units_;
     std::vector<double> values_;
@@ -332,7 +342,7 @@ Result<std::vector<SpooledLayer<T>>> read_heights(const std::vector<PlacedFile>&
             auto dem = open_heights(file.path, options.open);
             if (!dem) return dem.error();
             if (!same_size(file, (*dem)->info())) return changed(file);
-            HeightReader<T> reader(**dem, file.where, options.heights, raw);
+            HeightReader<T> reader(**dem, file, options.heights, raw);
             if (auto ok = lay_file<T>(
                     file, member, *fresh->spool,
                     [&](std::int64_t begin, std::int64_t end, std::span<T> out) { return reader(begin, end, out); },

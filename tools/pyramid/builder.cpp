@@ -28,6 +28,7 @@
 #include "tools/pyramid/row_bands.h"
 #include "tools/pyramid/texture_pyramid.h"
 #include "tools/pyramid/tint.h"
+#include "tools/pyramid/warp_error.h"
 
 namespace scree {
 namespace {
@@ -366,6 +367,18 @@ Result<BuildReport> build_store(BuildPlan plan, const BuildOptions& options, con
         if (!planned) return planned.error();
         deep = std::move(*planned);
     }
+    WarpError warp;
+    if (stack && (!plan.mosaic.heights_copied || deep)) {
+        WarpErrorJob job{*stack, plan.mosaic.same_units, **spool, plan.mosaic, *quantizer};
+        if (deep) {
+            job.tree = &deep->tree;
+            job.deep = &*deep->heights;
+        }
+        job.stop = &stop;
+        auto measured = measure_warp_error(job);
+        if (!measured) return measured.error();
+        warp = *measured;
+    }
     auto heights = build_height_pyramid({spool->get(), writer->get(), lattice, *quantizer,
                                          [&](std::int64_t) {
                                              progress.add(static_cast<double>(width) / 1e6);
@@ -379,6 +392,7 @@ Result<BuildReport> build_store(BuildPlan plan, const BuildOptions& options, con
     d.height_offset_m = quantizer->height_offset_m;
     d.height_quantum_m = quantizer->quantum_m;
     d.height_quantum_error_m = heights->worst_quantum_error_m > 0 ? quantizer->quantum_m / 2 : 0;
+    d.warp_error_m = warp.greatest_m;
     d.min_height_m = d.height_m(heights->min_n);
     d.max_height_m = d.height_m(heights->max_n);
     d.height_tiles = heights->tile_count;
@@ -399,6 +413,8 @@ Result<BuildReport> build_store(BuildPlan plan, const BuildOptions& options, con
     const ProcessUsage usage = process_usage();
     report.cpu_seconds = usage.cpu_seconds;
     report.peak_rss_bytes = usage.peak_rss_bytes;
+    report.warp_error_m = warp.greatest_m;
+    report.warp_rms_m = warp.rms_m;
     report.source_megapixels = dem_pixels + image_megapixels(plan);
     report.height_tiles = d.height_tiles;
     report.texture_tiles = d.texture_tiles;

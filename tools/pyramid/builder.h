@@ -16,6 +16,7 @@ struct BuildReport {
     double cpu_seconds = 0;
     std::int64_t peak_rss_bytes = 0;
     double source_megapixels = 0;
+    double warp_error_m = 0, warp_rms_m = 0;  ///< what resampling cost (warp_error.h); 0: heights were copied
     std::int64_t height_tiles = 0;
     std::int64_t texture_tiles = 0;
     std::int64_t store_bytes = 0;
