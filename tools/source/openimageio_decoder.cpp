@@ -3,7 +3,6 @@
 #include <optional>
 #include <utility>
 
-#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
 
@@ -47,27 +46,6 @@ std::optional<SampleType> sample_type_of(OIIO::TypeDesc type) {
     }
 }
 
-// A grey pixel of value 0x0102.
-constexpr unsigned char kInterlacedPng[] = {
-    0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a, 0x00, 0x00, 0x00, 0x0d, 0x49, 0x48, 0x44, 0x52, 0x00, 0x00,
-    0x00, 0x01, 0x00, 0x00, 0x00, 0x01, 0x10, 0x00, 0x00, 0x00, 0x01, 0x1d, 0xe9, 0x77, 0x80, 0x00, 0x00, 0x00,
-    0x0e, 0x49, 0x44, 0x41, 0x54, 0x78, 0x01, 0x01, 0x03, 0x00, 0xfc, 0xff, 0x00, 0x01, 0x02, 0x00, 0x07, 0x00,
-    0x04, 0x6c, 0xf8, 0x39, 0x68, 0x00, 0x00, 0x00, 0x00, 0x49, 0x45, 0x4e, 0x44, 0xae, 0x42, 0x60, 0x82};
-
-// OpenImageIO 2.4 leaves the samples of interlaced 16-bit PNGs in the file's byte order. Asked of the library itself,
-// so that one which does not is not corrected.
-bool interlaced_png_is_swapped() {
-    static const bool swapped = [] {
-        OIIO::Filesystem::IOMemReader memory(kInterlacedPng, sizeof kInterlacedPng);
-        const std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create("png");
-        OIIO::ImageSpec spec;
-        std::uint16_t sample = 0;
-        return input && input->set_ioproxy(&memory) && input->open("probe.png", spec) &&
-               input->read_image(0, 0, 0, 1, OIIO::TypeDesc::UINT16, &sample) && sample == 0x0201;
-    }();
-    return swapped;
-}
-
 class OpenImageIoDecoder final : public PixelDecoder {
 public:
     explicit OpenImageIoDecoder(std::unique_ptr<OIIO::ImageInput> input)
@@ -93,8 +71,6 @@ public:
                    spec_.alpha_channel, *type,        spec_.tile_width > 0 ? spec_.tile_height : 0};
         // Half to float is the one conversion that OpenImageIO does without rescaling; integers are taken as they are.
         format_ = *type == SampleType::f16 ? OIIO::TypeDesc(OIIO::TypeDesc::FLOAT) : spec_.format;
-        swapped_ = header.kind == ImageKind::png && header.interlaced && *type == SampleType::u16 &&
-                   interlaced_png_is_swapped();
         return {};
     }
 
@@ -108,25 +84,16 @@ public:
                                                    spec_.nchannels, format_, out)
                               : input_->read_scanlines(0, 0, y_begin, y_end, 0, 0, spec_.nchannels, format_, out);
         // Some readers report a damaged strip but claim success.
-        if (read && !input_->has_error()) {
-            if (swapped_) swap_bytes(end - begin, out);
-            return {};
-        }
+        if (read && !input_->has_error()) return {};
         const std::string reason = input_->geterror();
         return Error{ErrorCode::input, reason.empty() ? "no reason given" : reason};
     }
 
 private:
-    void swap_bytes(std::int64_t rows, std::byte* out) const {
-        const std::byte* end = out + rows * layout_.width * layout_.channels * 2;
-        for (; out != end; out += 2) std::swap(out[0], out[1]);
-    }
-
     std::unique_ptr<OIIO::ImageInput> input_;
     OIIO::ImageSpec spec_;
     OIIO::TypeDesc format_;
     DecodedLayout layout_;
-    bool swapped_ = false;
 };
 
 void configure_openimageio() {
