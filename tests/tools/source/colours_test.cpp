@@ -478,21 +478,21 @@ TEST(ChosenStretch, OfEightBitFilesIsNone) {
 }
 
 TEST(ChosenStretch, LeavesTwoPercentAsideAtEitherEnd) {
-    std::vector<std::uint16_t> samples(102, 9999);
-    for (std::size_t i = 0; i < 101; ++i) samples[i] = static_cast<std::uint16_t>(i * 37 % 101 + 1000);
-    TestTiff layout = row_of<std::uint16_t>(102, 1);
+    std::vector<std::uint16_t> samples(101, 9999);
+    for (std::size_t i = 0; i < 100; ++i) samples[i] = static_cast<std::uint16_t>(i * 37 % 100 + 1000);
+    TestTiff layout = row_of<std::uint16_t>(101, 1);
     layout.nodata = "9999";
     const Written file(layout, samples.data());
-    EXPECT_EQ(chosen({file.path()}), (Stretch{1002, 1098, true}));
+    EXPECT_EQ(chosen({file.path()}), (Stretch{1001, 1098, true}));
     // Its 8-bit neighbours in a mosaic have no say and stay as they are.
     const Bytes bytes(3, 255);
     const Written neighbour(row_of<std::uint8_t>(3, 1), bytes.data());
     const auto both = chosen({neighbour.path(), file.path()});
-    EXPECT_EQ(both, (Stretch{1002, 1098, true}));
+    EXPECT_EQ(both, (Stretch{1001, 1098, true}));
     ColourReading reading;
     reading.stretch = both;
     EXPECT_EQ(neighbour.rgba(reading)[0], 255);
-    EXPECT_EQ(file.rgba(reading)[4 * 101 + 3], 0);
+    EXPECT_EQ(file.rgba(reading)[4 * 100 + 3], 0);
 }
 
 TEST(ChosenStretch, IsOneForAllFilesAndBands) {
@@ -517,6 +517,11 @@ TEST(ChosenStretch, LeavesWhatMaskAndAlphaHideAside) {
     layout.mask = {1, 1, 1, 0};
     const Written file(layout, samples.data());
     EXPECT_EQ(chosen({file.path()}), (Stretch{5, 7, true}));
+    const std::vector<std::uint16_t> with_alpha = {5, 1, 7, 65535, 60000, 0};
+    layout = row_of<std::uint16_t>(3, 2);
+    layout.extra_sample = EXTRASAMPLE_UNASSALPHA;
+    const Written transparent(layout, with_alpha.data());
+    EXPECT_EQ(chosen({transparent.path()}), (Stretch{5, 7, true}));
 }
 
 TEST(ChosenStretch, OfAConstantImageIsMidGrey) {
