@@ -373,13 +373,35 @@ Result<void> read_jpeg2000_header(const std::string& path, ImageHeader& header) 
     file.read(start.data(), static_cast<std::streamsize>(start.size()));
     const std::string_view text(start.data(), static_cast<std::size_t>(file.gcount()));
     const std::size_t siz = text.find(std::string_view("\xFF\x4F\xFF\x51", 4));
-    if (siz == std::string_view::npos || text.size() - siz < 24)
+    if (siz == std::string_view::npos || text.size() - siz < 45)
         return unusable(path, "the JPEG 2000 file has no codestream header in its first 64 KiB");
     const auto* bytes = reinterpret_cast<const unsigned char*>(text.data()) + siz;
     header.width = std::int64_t{big_endian(bytes + 8, 4)} - big_endian(bytes + 16, 4);
     header.height = std::int64_t{big_endian(bytes + 12, 4)} - big_endian(bytes + 20, 4);
     header.rows_per_strip = header.height;
+    // Ssiz of every component: its sign in the highest bit, its depth less 1 in the others.
+    const std::uint32_t components = big_endian(bytes + 40, 2);
+    for (std::size_t c = 0; c < components && siz + 42 + 3 * c < text.size(); ++c) {
+        const unsigned depth = bytes[42 + 3 * c];
+        if ((depth & 0x80) != 0)
+            return unusable(path, "its samples are signed, which its decoder misreads; store it as a GeoTIFF");
+        if (depth != bytes[42])
+            return unusable(path, "its bands differ in depth, which its decoder mixes up; store it as a GeoTIFF");
+    }
+    const int bits = (bytes[42] & 0x7F) + 1;
+    header.spread_bits = bits % 8 == 0 ? 0 : bits;
     return check_sides(path, header.width, header.height);
+}
+
+Result<void> read_bmp_header(const std::string& path, std::string_view start, ImageHeader& header) {
+    const auto* bytes = reinterpret_cast<const unsigned char*>(start.data());
+    if (start.size() < 34) return unusable(path, "the BMP ends within its header");
+    const bool has_compression = bytes[14] >= 40;  // the first field of the second header is its size
+    const unsigned compression = has_compression ? bytes[30] : 0u;
+    if (compression == 1 || compression == 2)
+        return unusable(path, "its pixels are run-length encoded, which its decoder misreads; store it uncompressed");
+    header.values_are_colours = bytes[has_compression ? 28 : 24] <= 8;  // bits a pixel: indices of a palette
+    return {};
 }
 
 std::optional<ImageKind> kind_of(std::string_view start, const std::string& path) {
@@ -490,6 +512,8 @@ Result<ImageHeader> read_image_header(const std::string& path) {
             header.rows_per_strip = std::numeric_limits<std::int64_t>::max();
             break;  // whole frame
         case ImageKind::bmp:
+            read = read_bmp_header(path, start, header);
+            break;
         case ImageKind::hdr:
             break;
     }
@@ -516,6 +540,10 @@ Result<std::optional<ImageHeader>> read_mask_header(const std::string& path, con
 }
 
 std::optional<double> nodata_as(SampleType type, const std::string& text) {
+    // What one C library printed for infinities.
+    if (text.find("1.#INF") != std::string::npos)
+        return nodata_as(type,
+                         (text.find('-') != std::string::npos ? -1 : 1) * std::numeric_limits<double>::infinity());
     const std::optional<double> value = parse_number(text);
     return value ? nodata_as(type, *value) : std::nullopt;
 }

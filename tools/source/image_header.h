@@ -36,6 +36,7 @@ struct ImageHeader {
     std::int64_t width = 0;
     std::int64_t height = 0;
     std::int64_t rows_per_strip = 1;  ///< rows that are decoded together; height when only the whole frame can be
+    bool interlaced = false;          ///< PNG only
     /// Bits a sample has when fewer than its type, else 0. TIFF: samples are handed out as they are, 0..2^bits - 1.
     int significant_bits = 0;
     /// The same for PNG and JPEG 2000, whose decoder spreads them over the type's range: the upper bits are the file's.
@@ -55,7 +56,8 @@ struct ImageHeader {
 const char* reader_name(ImageKind kind);
 
 /// Errors (ErrorCode::input): missing or empty file, unknown kind, sides of zero or above 2^30, a sample layout that is
-/// refused (complex, volumes, LogLuv, inks other than CMYK, colour filter mosaics), a JPEG cut off before its end.
+/// refused (complex, volumes, signed JPEG 2000, BMP of runs, LogLuv, inks other than CMYK, colour filter mosaics), a
+/// JPEG cut off before its end.
 Result<ImageHeader> read_image_header(const std::string& path);
 
 /// The transparency mask of a TIFF's first image (NewSubfileType 4, same size, one sample for all channels or one for

@@ -48,8 +48,8 @@ void put_value(SampleType type, double value, std::byte* out) {
     }
 }
 
-// Samples of other than whole bytes: a row is a string of bits, the first one highest (TIFF 6.0, FillOrder 1). 24-bit
-// ones are bytes of the machine's order, as libtiff leaves them.
+// Samples of other than whole bytes: a row is a string of bits, the first one highest (TIFF 6.0, FillOrder 1). So
+// are 24-bit ones as GDAL writes and reads them, whatever the file's byte order.
 class BitReader {
 public:
     explicit BitReader(const std::byte* from) : from_(reinterpret_cast<const unsigned char*>(from)) {}
@@ -74,17 +74,6 @@ void unpack_bits(int bits, const std::byte* from, std::byte* to, std::size_t ste
     for (std::int64_t i = 0; i < count; ++i, to += step) {
         std::uint32_t value = reader.next(bits);
         if (std::numeric_limits<T>::is_signed && (value >> (bits - 1)) != 0) value |= ~0u << bits;
-        const T sample = static_cast<T>(value);
-        std::memcpy(to, &sample, sizeof(T));
-    }
-}
-
-template <class T>
-void unpack_24_bits(const std::byte* from, std::byte* to, std::size_t step, std::int64_t count) {
-    for (std::int64_t i = 0; i < count; ++i, from += 3, to += step) {
-        std::uint32_t value = 0;
-        std::memcpy(&value, from, 3);
-        if (std::numeric_limits<T>::is_signed && (value >> 23) != 0) value |= ~0u << 24;
         const T sample = static_cast<T>(value);
         std::memcpy(to, &sample, sizeof(T));
     }
@@ -231,11 +220,9 @@ private:
             case SampleType::i16:
                 return unpack_bits<std::int16_t>(bits, from, to, step, count);
             case SampleType::i32:
-                return bits == 24 ? unpack_24_bits<std::int32_t>(from, to, step, count)
-                                  : unpack_bits<std::int32_t>(bits, from, to, step, count);
+                return unpack_bits<std::int32_t>(bits, from, to, step, count);
             default:
-                return bits == 24 ? unpack_24_bits<std::uint32_t>(from, to, step, count)
-                                  : unpack_bits<std::uint32_t>(bits, from, to, step, count);
+                return unpack_bits<std::uint32_t>(bits, from, to, step, count);
         }
     }
 
