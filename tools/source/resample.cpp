@@ -16,6 +16,12 @@ constexpr double kOutsideTolerance = 1e-6;
 /// A box of less than that (samples) weighs as the point in it, to a thousandth.
 constexpr double kNarrowBox = 1e-3;
 
+/// To the nearest whole number, halves up, of what is not negative: truncation is an instruction, lround a call.
+std::int64_t rounded(double value) {
+    constexpr double kHalf = 0.5;
+    return static_cast<std::int64_t>(value + kHalf);
+}
+
 /// Columns or rows of a raster.
 struct Axis {
     double low = 0, high = -1;   ///< where points may be
@@ -34,8 +40,8 @@ struct Axis {
     }
     bool holds(double u) const { return u >= low && u <= high; }  // false for NaN
     double onto(double u) const { return u < 0 ? 0 : u > end ? end : u; }
-    /// Of u in the raster: truncation rounds down.
-    std::int64_t nearest(double u) const { return std::min(static_cast<std::int64_t>(u + 0.5), last); }
+    /// Of u in the raster or at its rim.
+    std::int64_t nearest(double u) const { return std::min(rounded(u), last); }
     /// The first of the two samples that u lies between; at the last sample the pair that ends with it.
     std::int64_t pair(double u) const { return std::min(static_cast<std::int64_t>(u), last_pair); }
 };
@@ -319,7 +325,7 @@ std::uint32_t gather(std::uint64_t sums) {
 /// (a sixteenth of a level at most, whatever the contrast) and sum to 1: what is uniform stays what it is.
 bool plain_bilinear(const Samples<std::uint32_t>& samples, const Axis& columns, const Axis& rows, double u, double v,
                     std::uint32_t& out) {
-    const auto u12 = static_cast<std::int64_t>(u * 4096 + 0.5), v12 = static_cast<std::int64_t>(v * 4096 + 0.5);
+    const std::int64_t u12 = rounded(u * 4096), v12 = rounded(v * 4096);
     const std::int64_t c = std::min(u12 >> 12, columns.last_pair), r = std::min(v12 >> 12, rows.last_pair);
     const std::uint32_t* above = samples.find(c, r, 2, 2);
     if (above == nullptr) return false;

@@ -5,7 +5,6 @@
 #include <cassert>
 #include <cmath>
 #include <condition_variable>
-#include <limits>
 #include <mutex>
 #include <optional>
 #include <utility>
@@ -16,7 +15,6 @@
 namespace scree {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr int kSide = static_cast<int>(WarpMap::kChunk);
 constexpr int kNodes = kSide + 1;
 

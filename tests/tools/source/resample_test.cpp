@@ -169,8 +169,7 @@ TEST(Resample, APointIsVoidExactlyWhereItsNearestSampleIs) {
             for (int n = 0; n < 200; ++n) {
                 const double u = real(random, 0, 19), v = real(random, 0, 19);
                 const double z = sample(raster, raster.rule(kernel, shrink, shrink), u, v);
-                const bool is_void =
-                    std::isnan(raster.at(static_cast<std::int64_t>(u + 0.5), static_cast<std::int64_t>(v + 0.5)));
+                const bool is_void = std::isnan(raster.at(std::lround(u), std::lround(v)));
                 ASSERT_EQ(std::isnan(z), is_void);
                 // Voids have no weight, and nothing overshoots for want of samples.
                 if (!is_void) {

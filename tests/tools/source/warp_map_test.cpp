@@ -113,14 +113,14 @@ struct Setting {
 };
 
 const std::vector<Setting>& settings() {
-    static const std::vector<Setting> all = {
+    static const std::vector<Setting> kAll = {
         {120.2, 22, 121.8, 25, {{"EPSG:32651", 1}, {"EPSG:4326", 1e5}, {"EPSG:3826", 1}, {"EPSG:3857", 1}}},
         {-1, 43, 6, 49, {{"EPSG:32631", 1}, {"EPSG:4326", 1e5}, {"EPSG:2154", 1}, {"EPSG:3857", 1}}},
         {-179.9, 70, 179.9, 89.99, {{"EPSG:3413", 1}, {"EPSG:4326", 1e5}, {"EPSG:3995", 1}}},
         {-179.9, -89.99, 179.9, -70, {{"EPSG:3031", 1}, {"EPSG:4326", 1e5}, {"EPSG:32761", 1}}},
         {179.9, -20, 180.1, -15, {{"EPSG:32601", 1}, {"EPSG:4326", 1e5}, {"EPSG:32660", 1}}},
     };
-    return all;
+    return kAll;
 }
 
 /// Where grid point (i, j) lies in the source by PROJ, on whichever turn is nearest to `guess`.
@@ -472,7 +472,7 @@ TEST(WarpMap, SurfacesComeThroughMapAndResampling) {
         }
         const WarpMap map = make({x0, y0, 10}, "EPSG:32651", place, source_crs, {size, size, nullptr});
         const Mapped got(map, 0, 0, 128, 128);
-        std::vector<double> heights(128 * 128);
+        std::vector<double> heights(std::size_t{128} * 128);
         resample_heights({0, 0, size, size, values}, {const_cast<Mapped&>(got).column, const_cast<Mapped&>(got).row},
                          {Kernel::bilinear, map.shrink_at(64, 64), false, size, size}, heights);
         std::size_t present = 0;
