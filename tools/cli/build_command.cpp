@@ -3,18 +3,29 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 
 #include "common/report.h"
 #include "tools/cli/height_options.h"
 #include "tools/pyramid/builder.h"
+#include "tools/source/number_text.h"
 
 namespace scree {
 namespace {
 
 const std::map<std::string, Kernel> kKernels = {
     {"nearest", Kernel::nearest}, {"bilinear", Kernel::bilinear}, {"cubic", Kernel::cubic}};
+
+Result<FillRule> parse_fill(const std::string& text) {
+    if (text == "smooth") return FillRule{FillRule::Kind::smooth};
+    if (text == "none") return FillRule{FillRule::Kind::none};
+    const auto height = parse_number(text);
+    if (!height || !(std::abs(*height) <= 1e7))
+        return Error{ErrorCode::usage, fmt::format("--fill {} is not smooth, none or a height within 1e7 m", text)};
+    return FillRule{FillRule::Kind::value, *height};
+}
 
 void print_plan(const BuildPlan& plan) {
     const Dataset& d = plan.dataset;
@@ -38,6 +49,7 @@ int run_build(int argc, char** argv) {
     std::string memory = "256M", json;
     bool dry_run = false;
     std::vector<double> stretch;
+    std::string fill = "smooth";
     app.add_option("DEM", options.dems,
                    "Heights: files and folders; where several have a value the later one lies on top")
         ->required()
@@ -55,6 +67,8 @@ int run_build(int argc, char** argv) {
     app.add_option("--resampling", options.kernel, "Where samples are not lattice points: nearest, bilinear or cubic")
         ->transform(CLI::CheckedTransformer(kKernels, CLI::ignore_case))
         ->default_str("bilinear");
+    app.add_option("--fill", fill, "Interior voids of the heights: smooth, none, or a height in metres")
+        ->capture_default_str();
     app.add_option("--bands", options.colours.bands, "Bands shown as red, green, blue, or as grey: 3,2,1")
         ->delimiter(',');
     app.add_option("--stretch", stretch,
@@ -82,6 +96,9 @@ int run_build(int argc, char** argv) {
     } catch (const CLI::ParseError& error) {
         return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorCode::usage);
     }
+    auto rule = parse_fill(fill);
+    if (!rule) return report_error("scree build", rule.error());
+    options.fill = *rule;
     if (!stretch.empty()) options.colours.stretch = Stretch{stretch[0], stretch[1]};
     const auto bytes = parse_bytes(memory);
     if (!bytes)
@@ -98,6 +115,9 @@ int run_build(int argc, char** argv) {
     if (dry_run) return 0;
     auto report = build_store(std::move(*plan), options, interrupt_flag());
     if (!report) return report_error("scree build", report.error());
+    for (const std::string& warning : report->warnings) note("warning: {}\n", warning);
+    if (!options.quiet)
+        for (const std::string& line : report->notes) note("{}\n", line);
     if (!options.quiet)
         note("{}: {:.1f} MB, {} height tiles, {} texture tiles; {:.1f} s, {:.1f} CPU s, peak {} MiB\n", options.out,
              static_cast<double>(report->store_bytes) / 1e6, report->height_tiles, report->texture_tiles,

@@ -8,6 +8,8 @@
 #include <optional>
 #include <type_traits>
 
+#include "tools/source/suspect_values.h"
+
 namespace scree {
 namespace {
 
@@ -276,11 +278,13 @@ public:
         : dem_(dem),
           path_(file.path),
           voids_(dem.info(), reading),
+          suspects_(dem.info(), reading),
           units_(raw ? HeightUnits{} : units_of(dem.info(), file.where, reading)) {}
 
     Result<void> operator()(std::int64_t begin, std::int64_t end, std::span<T> out) {
         values_.resize(out.size());
         if (auto ok = dem_.read_channel(begin, end, std::span<double>(values_)); !ok) return ok;
+        suspects_.add(values_);
         voids_.apply(values_);
         if (units_ != HeightUnits{})
             for (double& v : values_) {
@@ -290,14 +294,21 @@ public:
                     return Error{ErrorCode::input, fmt::format("{}: value {} times its scale {} is no finite height",
                                                                path_, raw, units_.scale)};
             }
+        for (const double v : values_)
+            if (std::isfinite(v)) range_.include({v, v});
         std::transform(values_.begin(), values_.end(), out.begin(), [](double v) { return static_cast<T>(v); });
         return {};
     }
+
+    const HeightRange& range() const { return range_; }
+    const SuspectValues& suspects() const { return suspects_; }
 
 private:
     ImageSource& dem_;
     std::string path_;
     VoidRule voids_;
+    SuspectValues suspects_;
+    HeightRange range_;
     HeightUnits units_;
     std::vector<double> values_;
 };
@@ -332,7 +343,8 @@ Result<std::vector<LayerOnGrid<T>>> place_on(const std::vector<SpooledLayer<T>>&
 
 template <class T>
 Result<std::vector<SpooledLayer<T>>> read_heights(const std::vector<PlacedFile>& files, std::vector<Layer> layers,
-                                                  bool raw, const StackOptions& options, const ReadProgress& progress) {
+                                                  bool raw, const StackOptions& options, const ReadProgress& progress,
+                                                  HeightRange& range, std::vector<std::string>& warnings) {
     std::vector<SpooledLayer<T>> spooled;
     for (Layer& layer : layers) {
         auto fresh = empty_layer<T>(std::move(layer), options, static_cast<T>(kUncovered));
@@ -349,6 +361,8 @@ Result<std::vector<SpooledLayer<T>>> read_heights(const std::vector<PlacedFile>&
                     progress);
                 !ok)
                 return ok.error();
+            range.include(reader.range());
+            if (auto warning = reader.suspects().warning(file.path)) warnings.push_back(std::move(*warning));
         }
         spooled.push_back(std::move(*fresh));
     }
@@ -394,6 +408,8 @@ struct HeightStack::Impl {
     Kernel kernel = Kernel::bilinear;
     std::vector<SpooledLayer<float>> narrow;  // one of the two is empty
     std::vector<SpooledLayer<double>> wide;
+    HeightRange range;
+    std::vector<std::string> warnings;
 };
 
 HeightStack::HeightStack(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -405,17 +421,29 @@ Result<std::unique_ptr<HeightStack>> HeightStack::read(const std::vector<PlacedF
     auto impl = std::make_unique<Impl>();
     impl->kernel = options.kernel;
     if (wide(files, raw_values, options.heights)) {
-        auto read = read_heights<double>(files, std::move(layers), raw_values, options, progress);
+        auto read =
+            read_heights<double>(files, std::move(layers), raw_values, options, progress, impl->range, impl->warnings);
         if (!read) return read.error();
         impl->wide = std::move(*read);
     } else {
-        auto read = read_heights<float>(files, std::move(layers), raw_values, options, progress);
+        auto read =
+            read_heights<float>(files, std::move(layers), raw_values, options, progress, impl->range, impl->warnings);
         if (!read) return read.error();
         impl->narrow = std::move(*read);
     }
     return std::unique_ptr<HeightStack>(new HeightStack(std::move(impl)));
 }
 
+HeightRange HeightStack::range() const {
+    HeightRange range = impl_->range;
+    if (impl_->kernel == Kernel::cubic) {
+        const double more = (range.high - range.low) / 2;
+        range.include({range.low - more, range.high + more});
+    }
+    return range;
+}
+
+const std::vector<std::string>& HeightStack::warnings() const { return impl_->warnings; }
 std::size_t HeightStack::layer_count() const { return impl_->narrow.size() + impl_->wide.size(); }
 
 const Layer& HeightStack::layer(std::size_t k) const {

@@ -1,9 +1,11 @@
 // The layers of a mosaic, one over the other, as values on the points of a square north-up grid.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <span>
 #include <string>
@@ -34,6 +36,14 @@ std::int64_t image_stack_bytes(const std::vector<PlacedFile>& files);
 
 class HeightGrid;
 
+struct HeightRange {
+    double low = std::numeric_limits<double>::infinity(), high = -std::numeric_limits<double>::infinity();
+    void include(const HeightRange& other) {
+        low = std::min(low, other.low);
+        high = std::max(high, other.high);
+    }
+};
+
 /// Heights in metres: value * scale + offset as HeightReading and the file say; or the files' raw values.
 class HeightStack {
 public:
@@ -46,6 +56,10 @@ public:
     /// The heights on the points of a grid. The stack must outlive it.
     Result<std::unique_ptr<HeightGrid>> on(const TargetGrid& grid, const Crs& grid_crs) const;
 
+    /// Of all values in the files, whether hidden or not; widened by cubic resampling's overshoot.
+    HeightRange range() const;
+    /// What the files hold that looks like undeclared nodata, one sentence a file.
+    const std::vector<std::string>& warnings() const;
     std::size_t layer_count() const;
     const Layer& layer(std::size_t k) const;
     /// Samples of a layer as they are after its files were laid over one another: [column, column + columns) x ...,

@@ -11,6 +11,7 @@
 #include "common/dataset.h"
 #include "common/result.h"
 #include "tools/mosaic/mosaic_plan.h"
+#include "tools/pyramid/void_fill.h"
 
 namespace scree {
 
@@ -25,6 +26,7 @@ struct BuildOptions : HeightReading {
     bool assume_same_datum = false;
     Kernel kernel = Kernel::bilinear;  ///< where samples are not lattice points
     ColourReading colours;
+    FillRule fill;  ///< of interior voids; a value in metres
     std::optional<double> height_quantum_m;
     int tile_size = 33;
     int texture_size = 256;

@@ -29,6 +29,7 @@
 #include "tools/pyramid/texture_pyramid.h"
 #include "tools/pyramid/tint.h"
 #include "tools/pyramid/warp_error.h"
+#include "tools/source/suspect_values.h"
 
 namespace scree {
 namespace {
@@ -47,7 +48,7 @@ double image_megapixels(const BuildPlan& plan) { return megapixels(plan.mosaic.i
 
 // The one DEM whose rows are the lattice's.
 Result<void> spool_in_place(const BuildPlan& plan, const BuildOptions& options, HeightSpool& spool, Progress& progress,
-                            const std::atomic<bool>& stop) {
+                            const std::atomic<bool>& stop, std::vector<std::string>& warnings) {
     auto dem = open_heights(plan.mosaic.heights.front().path, plan.open);
     if (!dem) return dem.error();
     const ImageInfo& info = (*dem)->info();
@@ -55,6 +56,7 @@ Result<void> spool_in_place(const BuildPlan& plan, const BuildOptions& options, 
         return Error{ErrorCode::input,
                      fmt::format("{}: has changed while it was read", plan.mosaic.heights.front().path)};
     const VoidRule voids(info, options);
+    SuspectValues suspects(info, options);
     std::vector<double> band(static_cast<std::size_t>(kSpoolBandRows * info.width));
     for (std::int64_t j = 0; j < info.height; j += kSpoolBandRows) {
         if (stop) return interrupted();
@@ -63,11 +65,13 @@ Result<void> spool_in_place(const BuildPlan& plan, const BuildOptions& options, 
         if (auto ok = (*dem)->read_channel(j, j + rows, std::span<double>(band.data(), count)); !ok) return ok;
         for (std::int64_t r = 0; r < rows; ++r) {
             const std::span<double> row(band.data() + r * info.width, static_cast<std::size_t>(info.width));
+            suspects.add(row);
             voids.apply(row);
             if (auto ok = spool.append(row); !ok) return ok;
         }
         progress.add(static_cast<double>(rows * info.width) / 1e6);
     }
+    if (auto warning = suspects.warning(plan.mosaic.heights.front().path)) warnings.push_back(std::move(*warning));
     return {};
 }
 
@@ -94,15 +98,34 @@ Result<void> spool_stack(const BuildPlan& plan, const HeightStack& stack, Height
     RowBands<double> bands(spool.width(),
                            [&](std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
                                std::span<double> out) { return (*grid)->sample(i, j, columns, rows, 1, out); });
-    std::vector<double> row(static_cast<std::size_t>(spool.width()));
     for (std::int64_t j = 0; j < spool.height(); ++j) {
         if (stop) return interrupted();
         auto values = bands.row(j);
         if (!values) return values.error();
-        std::transform(values->begin(), values->end(), row.begin(),
-                       [](double v) { return std::isfinite(v) ? v : std::numeric_limits<double>::quiet_NaN(); });
-        if (auto ok = spool.append(row); !ok) return ok;
+        if (auto ok = spool.append(*values); !ok) return ok;
     }
+    return {};
+}
+
+// Interior voids get heights; what was left is said.
+Result<void> fill_voids(const BuildPlan& plan, const BuildOptions& options, const HeightUnits& units,
+                        HeightSpool& spool, const std::atomic<bool>& stop, BuildReport& report) {
+    FillRule rule = options.fill;
+    rule.integer = plan.integer_heights;
+    if (rule.kind == FillRule::Kind::value) rule.value = (rule.value - units.offset_m) / units.scale;
+    auto filled = fill_interior_voids(spool, rule, options.memory_bytes / 8, [&] { return !stop.load(); });
+    if (!filled) return filled.error().code == ErrorCode::interrupted ? interrupted() : filled.error();
+    report.filled_samples = filled->filled_samples;
+    if (filled->filled_samples > 0) range.include({filled->min_raw, filled->max_raw});
+    if (filled->filled_samples > 0)
+        report.notes.push_back(
+            fmt::format("{} samples of {} interior voids were filled", filled->filled_samples, filled->filled_regions));
+    if (filled->too_large_regions > 0)
+        report.notes.push_back(fmt::format(
+            "{} interior voids ({} samples) are too large to fill and stay absent; the largest spans {} x {} "
+            "samples at column {}, row {} of the lattice",
+            filled->too_large_regions, filled->too_large_samples, filled->largest_left.width,
+            filled->largest_left.height, filled->largest_left.west, filled->largest_left.north));
     return {};
 }
 
@@ -348,17 +371,22 @@ Result<BuildReport> build_store(BuildPlan plan, const BuildOptions& options, con
         if (!read) return read.error();
         stack = std::move(*read);
     }
-    auto spooled =
-        stack ? spool_stack(plan, *stack, **spool, stop) : spool_in_place(plan, options, **spool, progress, stop);
+    BuildReport report;
+    if (stack) report.warnings = stack->warnings();
+    auto spooled = stack ? spool_stack(plan, *stack, **spool, stop)
+                         : spool_in_place(plan, options, **spool, progress, stop, report.warnings);
     if (!spooled) return spooled.error();
     const std::string& first_dem = plan.mosaic.heights.front().path;
     auto summary = (*spool)->finish();
     if (!summary) return Error{summary.error().code, fmt::format("{}: {}", first_dem, summary.error().message)};
+    HeightRange range{summary->min_raw, summary->max_raw};
+    if (plan.mosaic.base_shift > 0) range.include(stack->range());  // between the spool's points there are others
     HeightUnits units;
     if (plan.mosaic.same_units)
         units = units_of(plan.mosaic.heights.front().info, plan.mosaic.heights.front().where, options);
-    auto quantizer = choose_quantizer({plan.integer_heights, units.scale, units.offset_m, options.height_quantum_m,
-                                       summary->min_raw, summary->max_raw});
+    if (auto ok = fill_voids(plan, options, units, **spool, stop, report, range); !ok) return ok.error();
+    auto quantizer = choose_quantizer(
+        {plan.integer_heights, units.scale, units.offset_m, options.height_quantum_m, range.low, range.high});
     if (!quantizer) return Error{quantizer.error().code, fmt::format("{}: {}", first_dem, quantizer.error().message)};
 
     std::unique_ptr<DeepPart> deep;
@@ -408,7 +436,6 @@ Result<BuildReport> build_store(BuildPlan plan, const BuildOptions& options, con
     if (auto ok = (*partial)->rename_to(options.out); !ok) return ok.error();
     progress.finish();
 
-    BuildReport report;
     report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     const ProcessUsage usage = process_usage();
     report.cpu_seconds = usage.cpu_seconds;

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "common/result.h"
 #include "tools/pyramid/build_plan.h"
@@ -20,7 +21,9 @@ struct BuildReport {
     std::int64_t height_tiles = 0;
     std::int64_t texture_tiles = 0;
     std::int64_t store_bytes = 0;
-    std::string warning;  ///< what the user should know, or empty
+    std::int64_t filled_samples = 0;    ///< of interior voids
+    std::vector<std::string> warnings;  ///< what the user should look into
+    std::vector<std::string> notes;     ///< what was done that may surprise
 };
 
 /// Checks the disk and that OUT may be written; prints what will be needed unless quiet.
