@@ -9,6 +9,12 @@
 namespace scree::fuzz {
 namespace {
 
+// A literal that holds zeros.
+template <std::size_t N>
+std::string bytes(const char (&text)[N]) {
+    return std::string(text, N - 1);
+}
+
 std::string tiff_bytes(std::uint32_t tile, const char* mode) {
     test::TestTiff tiff;
     tiff.tile = tile;
@@ -29,13 +35,10 @@ std::vector<std::string> seeds() {
         tiff_bytes(0, "w"),
         tiff_bytes(16, "wb"),
         tiff_bytes(0, "w8"),
-        std::string("\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\x04\0\0\0\x03\x08\x02\0\0\0????", 33),
-        std::string(
-            "\xFF\xD8\xFF\xE0\0\x10JFIF\0\1\1\0\0\1\0\1\0\0\xFF\xC0\0\x0B\x08\0\3\0\4\1\1\x11\0\xFF\xDA\0\x08\1\1\0\0"
-            "\x3F\0\x12\x34\xFF\xD9",
-            50),
-        std::string("\0\0\0\x0CjP  \r\n\x87\n\xFF\x4F\xFF\x51\0\x29\0\0\0\0\0\x04\0\0\0\x03\0\0\0\0\0\0\0\0\0\0\0\x04",
-                    42),
+        bytes("\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\x04\0\0\0\x03\x08\x02\0\0\0????"),
+        bytes("\xFF\xD8\xFF\xE0\0\x10JFIF\0\1\1\0\0\1\0\1\0\0\xFF\xC0\0\x0B\x08\0\3\0\4\1\1\x11\0\xFF\xDA\0\x08\1\1\0\0"
+              "\x3F\0\x12\x34\xFF\xD9"),
+        bytes("\0\0\0\x0CjP  \r\n\x87\n\xFF\x4F\xFF\x51\0\x29\0\0\0\0\0\x04\0\0\0\x03\0\0\0\0\0\0\0\0\0\0\0\x04"),
         "BM" + std::string(60, '\1'),
         "RIFF\1\0\0\0WEBPVP8 ",
         "P5\n4 3\n255\nabcdefghijkl",
