@@ -34,6 +34,8 @@ namespace {
 constexpr double kNegligibleRotation = 1e-9;
 // Six numbers of 17 digits fit 200 bytes; what is a thousand times that is not a world file.
 constexpr std::uintmax_t kMaxWorldFileBytes = 65536;
+// No CRS has places so far off, and 2^30 steps of this size still have finite sums.
+constexpr double kFarthest = 1e15;
 constexpr std::uint16_t kTiePointDoubles = 6;
 constexpr std::uint16_t kMatrixDoubles = 16;
 constexpr std::uint32_t kGdalMetadataTag = 42112;
@@ -221,7 +223,7 @@ bool Georeference::axis_aligned() const {
 Result<void> check_place(const Georeference& place, const std::string& path, const char* where) {
     for (const double value :
          {place.first_x, place.first_y, place.column_x, place.column_y, place.row_x, place.row_y}) {
-        if (!std::isfinite(value))
+        if (!(std::abs(value) <= kFarthest))
             return Error{ErrorCode::input,
                          fmt::format("{}: {} holds {}, so the samples lie nowhere", path, where, value)};
     }

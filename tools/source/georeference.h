@@ -30,7 +30,8 @@ struct Georeference {
     bool axis_aligned() const;
 };
 
-/// Numbers that place samples: finite, and not all on one line. Errors: ErrorCode::input; `where` is what holds them.
+/// Numbers that place samples: none beyond 1e15, and samples not all on one line. Errors: ErrorCode::input; `where` is
+/// what holds them.
 Result<void> check_place(const Georeference& place, const std::string& path, const char* where);
 
 /// Reads GeoTIFF tags of a TIFF file; nullopt when it has none. A place is given by ModelPixelScale and the first

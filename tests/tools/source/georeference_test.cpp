@@ -272,7 +272,7 @@ TEST(Georeference, AGeographicFileSaysDegrees) {
 
 TEST(Georeference, AZeroOrInfiniteStepIsAnErrorThatNamesTheFile) {
     const TempDirectory directory;
-    for (const double step : {0.0, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
+    for (const double step : {0.0, 1e16, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
         TestTiff tiff = placed();
         tiff.scale = {step, 20, 0};
         const std::string path = directory.path("absurd.tif");
