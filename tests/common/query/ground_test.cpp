@@ -68,27 +68,26 @@ TEST(Ground, AnswersEveryVertexOfAPresentCellWithItsSample) {
 }
 
 TEST(Ground, OnALineBetweenLeavesOfTwoDepthsTheDeeperAnswers) {
-    // The north-west quarter has every sample, the others every second.
+    // The south-east quarter has every sample, the others every second.
     test::WorldShape shape;
     const auto heights = [](std::int64_t i, std::int64_t j) { return static_cast<int>(i * i + 7 * (j % 2)); };
-    shape.cells_x = shape.cells_y = 16;
-    shape.depth = test::DepthMap::path_to({2, 0, 0});
+    shape.depth = test::DepthMap::path_to({2, 3, 3});
     const test::SmallWorld world(shape, heights);
-    ASSERT_TRUE(world.tiles().at({1, 1, 0}).header.is_leaf());
-    ASSERT_TRUE(world.tiles().at({2, 1, 0}).header.is_leaf());
+    ASSERT_TRUE(world.tiles().at({1, 0, 1}).header.is_leaf());
+    ASSERT_TRUE(world.tiles().at({2, 2, 2}).header.is_leaf());
     auto ground = Ground::open(world);
     ASSERT_TRUE(ground.ok());
-    // East of i = 8 samples at odd j are not stored: the coarse leaf's edge is straight there.
-    for (const auto& [j, level, height_m] : {std::tuple(3, 2, 64.0 + 7), {4, 2, 64.0}}) {
+    // West of i = 8 samples at odd j are not stored: the coarse leaf's edge is straight there.
+    for (const auto& [j, height_m] : {std::tuple(11, 64.0 + 7), {12, 64.0}}) {
         const auto height = (*ground)->height(world.x_m(8), world.y_m(j));
         ASSERT_TRUE(height.ok() && height->has_value());
         EXPECT_EQ((*height)->height_m, height_m);
-        EXPECT_EQ((*height)->level, level);
+        EXPECT_EQ((*height)->level, 2);
     }
-    const auto east = (*ground)->height(world.x_m(8 + 1e-9), world.y_m(3));
-    ASSERT_TRUE(east.ok() && east->has_value());
-    EXPECT_NEAR((*east)->height_m, 64, 1e-6);
-    EXPECT_EQ((*east)->level, 1);
+    const auto west = (*ground)->height(world.x_m(8 - 1e-9), world.y_m(11));
+    ASSERT_TRUE(west.ok() && west->has_value());
+    EXPECT_NEAR((*west)->height_m, 64, 1e-6);
+    EXPECT_EQ((*west)->level, 1);
 }
 
 TEST(Ground, EndsAtTheDataset) {
