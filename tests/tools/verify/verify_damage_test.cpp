@@ -459,6 +459,21 @@ TEST(VerifyDamage, PresenceOfALeafAboveTheDeepestLevel) {
     EXPECT_TRUE(names(none, "is stored without a present cell"));
 }
 
+TEST(VerifyDamage, ACellOfALeafThatReachesHalfBeyondTheData) {
+    std::vector<std::string> at_the_edge;
+    for (const auto& [id, tile] : test::make_small_store(kVarying).heights)
+        if (id.level == 3 && id.x == 7 && tile.header.is_leaf() && !tile.presence.empty() && tile.presence[2] != 0)
+            at_the_edge.push_back("height tile 3/7/" + std::to_string(id.y) + ": ");
+    ASSERT_FALSE(at_the_edge.empty());
+    // Its third column of cells, of two finest cells each, lies over columns 60 and 61.
+    const VerifyReport report = verify_varying_after([](SmallStore& s) { s.dataset.lattice.cells_x = 61; });
+    int named = 0;
+    for (const std::string& tile : at_the_edge)
+        for (const std::string& problem : report.problems)
+            named += problem.starts_with(tile) && problem.ends_with("cells outside the data's extent are present");
+    EXPECT_EQ(named, static_cast<int>(at_the_edge.size()));
+}
+
 TEST(VerifyDamage, WhatParentsSayOfTheDepthBelowThem) {
     const auto change_first = [](SmallStore& s, const auto& fits, const auto& change) {
         for (auto& [id, tile] : s.heights)
