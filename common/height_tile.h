@@ -38,9 +38,9 @@ struct HeightBounds {
 };
 
 struct HeightTileHeader {
-    std::uint8_t child_mask = 0;        ///< bit q: child quadrant q is stored (has a present cell); 0: a leaf
-    std::uint8_t leaf_mask = 0;         ///< bit q: child q is a leaf above the deepest level
-    bool texture_ends = false;          ///< no texture tile below this address is stored
+    std::uint8_t child_mask = 0;  ///< bit q: child quadrant q is stored (has a present cell); 0: a leaf
+    std::uint8_t leaf_mask = 0;   ///< bit q: child q is a leaf above the deepest level
+    bool texture_ends = false;    ///< above the deepest texture level: the texture here is not refined, or ends above
     std::uint8_t texture_end_mask = 0;  ///< bit q: the same of child q
     HeightBounds own;
     std::array<HeightBounds, 4> children;  ///< those of existing children, zero elsewhere

@@ -37,10 +37,17 @@ public:
         return map;
     }
 
+    /// Refined from the root to the parent of `id`, and nowhere else.
+    static DepthMap path_to(TileId id) {
+        DepthMap map;
+        map.varies_ = true;
+        for (int level = 0; level < id.level; ++level) map.refined_.insert(ancestor_at(id, level));
+        return map;
+    }
+
     bool varies() const { return varies_; }
     /// Meant for addresses above the deepest level.
     bool refined(TileId id) const { return !varies_ || refined_.contains(id); }
-    void refine(TileId id) { refined_.insert(id); }
     /// Every address above it is refined.
     bool exists(TileId id) const {
         for (int level = 0; level < id.level; ++level)

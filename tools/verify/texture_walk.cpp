@@ -6,42 +6,22 @@
 
 namespace scree {
 
-// What the texture pyramid holds at the address of a height tile. A damaged texture above is not known to have
-// children.
-void TileWalk::enter_texture(Frame& frame, const Frame* parent) {
-    frame.textured = parent == nullptr || refined(parent->id, parent->texture);
-    if (!frame.textured) {
-        if (parent->textured && !parent->texture.tile) frame.complete = false;
-        return;
-    }
-    frame.texture = read_texture(frame.id);
-    frame.alpha = AlphaRaster(dataset_.texture_size());
-    if (!frame.texture.tile) frame.complete = false;
-}
-
-// The runtime asks for the textures that these bits do not rule out.
 void TileWalk::check_texture_end(const Frame& frame) {
-    const HeightTileHeader& header = frame.tile->header;
-    if (frame.id.level >= dataset_.texture_deepest_level) return;
-    if (frame.textured && !frame.texture.tile) return;  // not known
-    const bool finer = refined(frame.id, frame.texture);
-    if (header.texture_ends && finer)
-        problems_.add(fmt::format("height tile {}/{}/{} says that textures end here; there are finer ones",
-                                  frame.id.level, frame.id.x, frame.id.y));
-    if (!header.texture_ends && !finer && !header.is_leaf())
-        problems_.add(fmt::format("height tile {}/{}/{} does not say that textures end here", frame.id.level,
-                                  frame.id.x, frame.id.y));
+    if (frame.textured || frame.tile->header.texture_ends || frame.id.level >= dataset_.texture_deepest_level) return;
+    problems_.add(fmt::format("height tile {}/{}/{} does not say that textures end here: they end above it",
+                              frame.id.level, frame.id.x, frame.id.y));
 }
 
 void TileWalk::check_texture(const Frame& frame) {
+    const TextureRow row = read_texture(frame.id);
     // Refined wholly or not at all.
-    judge_texture(frame.id, frame.texture, refined(frame.id, frame.texture) ? frame.texture_children : std::uint8_t{0},
+    judge_texture(frame.id, row, refined(frame) ? frame.texture_children : std::uint8_t{0},
                   frame.complete ? &frame.alpha : nullptr);
 }
 
 // The texels over a leaf of the heights belong to the deepest texture there.
 void TileWalk::mark_leaf(Frame& frame, const CellPresence& presence) {
-    if (frame.textured && refined(frame.id, frame.texture)) {
+    if (refined(frame)) {
         frame.texture_children = visit_texture_children(frame.id, presence, frame.alpha, frame.complete);
         return;
     }
@@ -115,7 +95,7 @@ bool TileWalk::visit_texture_below(TileId id, const CellPresence& presence, Alph
     std::uint8_t mask = 0;
     if (!row.tile)
         complete = false;
-    else if (!refined(id, row))
+    else if (row.tile->child_mask == 0 || id.level >= dataset_.texture_deepest_level)
         mark_present(TexelGrid(dataset_, id.level), id.x, id.y, presence, alpha);
     else
         mask = visit_texture_children(id, presence, alpha, complete);

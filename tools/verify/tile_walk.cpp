@@ -68,7 +68,8 @@ bool TileWalk::visit(TileId id) {
     frame.tile = *tile;
     frame.block = coarsest_block(frame.tile->samples, n);
     frame.stride = lattice_.tile_extent(id.level) / 2;
-    enter_texture(frame, parent);
+    frame.textured = parent == nullptr || refined(*parent);
+    if (frame.textured) frame.alpha = AlphaRaster(dataset_.texture_size());
 
     check_header(frame, parent);
     check_range(frame);

@@ -44,9 +44,8 @@ private:
         std::int64_t stride = 1;              // of that block, finest cells
         std::int64_t worst = 0;               // its true error, times 2 * stride
         bool complete = true;                 // every tile below could be read
-        bool textured = false;                // the texture above has children, or this is a root
-        TextureRow texture;                   // of the same address, if so
-        AlphaRaster alpha{0};                 // likewise
+        bool textured = false;                // textures do not end above it
+        AlphaRaster alpha{0};                 // if so
         std::uint8_t texture_children = 0;
     };
 
@@ -68,12 +67,11 @@ private:
     void count_bound(TileId id, int geomip, const ExactError& truth, float stored);
     void finish_dataset();
 
-    void enter_texture(Frame& frame, const Frame* parent);
     void check_texture(const Frame& frame);
     TextureRow read_texture(TileId id);
-    /// Has it children? None do on the deepest level, whatever they say.
-    bool refined(TileId id, const TextureRow& row) const {
-        return row.tile && row.tile->child_mask != 0 && id.level < dataset_.texture_deepest_level;
+    /// The texture of a frame has children: the heights say so.
+    bool refined(const Frame& frame) const {
+        return frame.textured && frame.id.level < dataset_.texture_deepest_level && !frame.tile->header.texture_ends;
     }
     void judge_texture(TileId id, const TextureRow& row, std::uint8_t child_mask, const AlphaRaster* alpha);
     std::uint8_t visit_texture_children(TileId id, const CellPresence& presence, AlphaRaster& alpha, bool& complete);

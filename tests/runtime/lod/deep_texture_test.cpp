@@ -188,5 +188,41 @@ TEST(DeepTextures, APartReachesNoFurtherThanTheDataDoesSoThatNoPartIsMoreUrgentT
     }
 }
 
+// Fine imagery of one corner over coarse imagery of the rest, on flat ground: pages are split for it there alone, and
+// no texture is asked for that is not stored.
+TEST(DeepTextures, FineImageryOfOnePlaceSplitsNoPagesElsewhere) {
+    test::TerrainShape shape;
+    shape.tile_cells_log2 = 3;
+    shape.cells_x = shape.cells_y = 128;
+    shape.texture_depth = 4;
+    const Lattice l = *make_lattice(0, 0, 1, 128, 128, 3);
+    ASSERT_EQ(l.deepest_level, 4);
+    shape.texture_depth_map = test::DepthMap::path_to({4, 15, 15});
+    const test::SyntheticTerrain terrain(shape, [](std::int64_t, std::int64_t) { return 0; });
+    ASSERT_EQ(terrain.textures().size(), 17u);
+    Selector selector(terrain.dataset());
+    for (const bool with_textures : {true, false}) {
+        test::FakeResidency residency(terrain);
+        for (const TileId id : terrain.tiles()) residency.add(id);
+        residency.add_texture({0, 0, 0});
+        if (with_textures) residency.add_all();
+        const auto look_down = [&](double i, double j) -> const Selection& {
+            const Lattice& at = terrain.lattice();
+            auto camera = look_at({at.x_m(i), at.y_m(j), 60}, {at.x_m(i), at.y_m(j) + 0.1, 50}, 40, 800, 800);
+            EXPECT_TRUE(camera.ok());
+            SelectionSettings settings = test::with_tau(1);
+            settings.texture_tau_px = 0.01;
+            return selector.select({&*camera, 1}, settings, residency);
+        };
+        for (const DrawItem& item : look_down(20, 20).draws[0]) EXPECT_EQ(item.tile.level, 1);
+        int finest = 0;
+        const Selection& s = look_down(124, 124);
+        for (const DrawItem& item : s.draws[0]) finest = std::max(finest, item.tile.level);
+        EXPECT_EQ(finest, 4);
+        for (const TileRequest& request : s.requests) EXPECT_TRUE(terrain.has_texture(request.id));
+        EXPECT_EQ(s.complete, with_textures);
+    }
+}
+
 }  // namespace
 }  // namespace scree

@@ -459,6 +459,21 @@ TEST(VerifyDamage, PresenceOfALeafAboveTheDeepestLevel) {
     EXPECT_TRUE(names(none, "is stored without a present cell"));
 }
 
+TEST(VerifyDamage, ACellOfALeafThatReachesHalfBeyondTheData) {
+    std::vector<std::string> at_the_edge;
+    for (const auto& [id, tile] : test::make_small_store(kVarying).heights)
+        if (id.level == 3 && id.x == 7 && tile.header.is_leaf() && !tile.presence.empty() && tile.presence[2] != 0)
+            at_the_edge.push_back("height tile 3/7/" + std::to_string(id.y) + ": ");
+    ASSERT_FALSE(at_the_edge.empty());
+    // Its third column of cells, of two finest cells each, lies over columns 60 and 61.
+    const VerifyReport report = verify_varying_after([](SmallStore& s) { s.dataset.lattice.cells_x = 61; });
+    int named = 0;
+    for (const std::string& tile : at_the_edge)
+        for (const std::string& problem : report.problems)
+            named += problem.starts_with(tile) && problem.ends_with("cells outside the data's extent are present");
+    EXPECT_EQ(named, static_cast<int>(at_the_edge.size()));
+}
+
 TEST(VerifyDamage, WhatParentsSayOfTheDepthBelowThem) {
     const auto change_first = [](SmallStore& s, const auto& fits, const auto& change) {
         for (auto& [id, tile] : s.heights)
@@ -491,29 +506,30 @@ TEST(VerifyDamage, WhatParentsSayOfTheDepthBelowThem) {
 }
 
 TEST(VerifyDamage, WhereTexturesEnd) {
-    int said_too_early = 0, not_said = 0;
+    int too_early = 0, too_late = 0, leaves = 0;
     const SmallStore sound = test::make_small_store(kVarying);
     for (const auto& [id, tile] : sound.heights) {
+        if (id.level >= sound.dataset.texture_deepest_level) continue;
         const TileId place = id;
-        const bool leaf = tile.header.is_leaf(), ends = tile.header.texture_ends;
-        if (leaf && ends) continue;  // a leaf need not say so
-        if (!ends && id.level >= sound.dataset.texture_deepest_level) continue;
+        const bool ends = tile.header.texture_ends;
         const VerifyReport report = verify_varying_after([&](SmallStore& s) {
             s.heights.at(place).header.texture_ends = !ends;
             if (place.level == 0) return;
             std::uint8_t& mask = s.heights.at(parent_of(place)).header.texture_end_mask;
             mask = static_cast<std::uint8_t>(mask ^ 1 << quadrant_of(place));
         });
-        const auto texture = sound.textures.find(id);
-        if (!ends && (texture == sound.textures.end() || texture->second.child_mask == 0)) {
-            EXPECT_TRUE(report.sound());
-            continue;
+        EXPECT_FALSE(report.sound()) << id.level << "/" << id.x << "/" << id.y;
+        if (ends && sound.textures.count(id) == 0) {
+            EXPECT_TRUE(names(report, "does not say that textures end here"));
+        } else {
+            EXPECT_TRUE(names(report, ends ? "is missing" : "should be 0000"));
         }
-        EXPECT_TRUE(names(report, ends ? "does not say that textures end here" : "says that textures end here"));
-        ++(ends ? not_said : said_too_early);
+        ++(ends ? too_late : too_early);
+        leaves += tile.header.is_leaf() ? 1 : 0;
     }
-    EXPECT_GT(said_too_early, 3);
-    EXPECT_GT(not_said, 0);
+    EXPECT_GT(too_early, 3);
+    EXPECT_GT(too_late, 10);
+    EXPECT_GT(leaves, 3);
 }
 
 TEST(VerifyDamage, ATextureMissingBelowOneWithOthers) {
