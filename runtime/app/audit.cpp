@@ -8,8 +8,8 @@
 #include <unordered_set>
 
 #include "common/mesh/geometric_error.h"
-#include "common/store/height_codec.h"
 #include "runtime/app/drawn_tile.h"
+#include "runtime/app/leaf_walk.h"
 #include "runtime/view/frustum.h"
 
 namespace scree {
@@ -96,26 +96,6 @@ double ErrorHistogram::quantile(double q) const {
     return max_;
 }
 
-namespace {
-
-// Visits the leaves at or under a tile: the finest surface there.
-template <class Visit>
-Result<void> for_each_leaf(TileReader& reader, const Lattice& lattice, TileId id, const Visit& visit) {
-    TileRow row;
-    auto found = reader.read(TileKind::height, id, row);
-    if (!found) return found.error();
-    if (!*found) return {};
-    const auto tile = decode_height_tile(row.payload, lattice.tile_cells_log2, row.codec);
-    if (!tile) return tile.error();
-    if (tile->header.is_leaf() || id.level >= lattice.deepest_level) return visit(id, *tile), Result<void>{};
-    for (int q = 0; q < 4; ++q)
-        if ((tile->header.child_mask >> q & 1) != 0)
-            if (auto ok = for_each_leaf(reader, lattice, child_of(id, q), visit); !ok) return ok;
-    return {};
-}
-
-}  // namespace
-
 Result<void> audit_frame(const TileStore& store, TileReader& reader, const AuditedFrame& frame,
                          ErrorHistogram& errors) {
     const Dataset& d = store.dataset();
@@ -149,29 +129,15 @@ Result<void> audit_frame(const TileStore& store, TileReader& reader, const Audit
 
 namespace {
 
-/// Columns of a source: with so much room for rounding a sample lies on a line of the lattice.
-constexpr double kOnLine = 1e-6;
-
-// Does the sample belong to a cell of four valid ones? Where it does not, nothing is drawn.
-bool is_drawn(const SourceRaster& source, std::int64_t column, std::int64_t row) {
-    const auto valid = [&](std::int64_t c, std::int64_t r) {
-        return c >= 0 && r >= 0 && c < source.columns && r < source.rows && !std::isnan(source.at(c, r));
-    };
-    for (const int dx : {-1, 1})
-        for (const int dy : {-1, 1})
-            if (valid(column + dx, row) && valid(column, row + dy) && valid(column + dx, row + dy)) return true;
-    return false;
-}
-
 // Which drawn tile a place belongs to: on a line between tiles to one of them, whichever are drawn.
 class TileMap {
 public:
     TileMap(const Lattice& lattice, const DrawList& draws) : lattice_(lattice) {
         for (const DrawItem& item : draws) drawn_.insert(item.tile);
     }
-    bool owns(TileId tile, double i, double j, double slack_i, double slack_j) const {
-        for (const std::int64_t cj : cells_at(j, slack_j))
-            for (const std::int64_t ci : cells_at(i, slack_i))
+    bool owns(TileId tile, double i, double j, double slack) const {
+        for (const std::int64_t cj : cells_at(j, slack))
+            for (const std::int64_t ci : cells_at(i, slack))
                 if (const auto found = over(ci, cj)) return *found == tile;
         return false;
     }
@@ -193,52 +159,42 @@ private:
     std::unordered_set<TileId, TileIdHash> drawn_;
 };
 
-/// Samples of a source along one axis: first and one past the last of those between two places, both included, given
-/// in columns.
-struct Range {
-    std::int64_t first, end;
-    Range(double from, double to, std::int64_t count)
-        : first(static_cast<std::int64_t>(std::clamp(std::ceil(from - kOnLine), 0.0, static_cast<double>(count)))),
-          end(static_cast<std::int64_t>(std::clamp(std::floor(to + kOnLine) + 1, 0.0, static_cast<double>(count)))) {}
-};
-
 }  // namespace
 
-void audit_against(const Dataset& d, const SourceRaster& source, const AuditedFrame& frame, double stated_m,
+void audit_against(const Dataset& d, const SourceJudge& source, const AuditedFrame& frame, double stated_m,
                    ErrorHistogram& errors, double& excess_px) {
     const Lattice& l = d.lattice;
     const Judge judge(frame);
     const TileMap tiles(l, frame.draws);
-    const double slack_i = kOnLine * source.dx / l.spacing_m, slack_j = kOnLine * source.dy / l.spacing_m;
+    const SourceLayer& layer = source.layer();
+    const double slack = source.slack_m() / l.spacing_m;
     DrawnTile drawn(
         l, make_relative_frame(l, d.height_offset_m, d.height_quantum_m, frame.camera.eye, frame.half_curvature));
-    const auto column_at = [&](std::int64_t i) { return (l.x_m(static_cast<double>(i)) - source.x0) / source.dx; };
-    const auto row_at = [&](std::int64_t j) { return (source.y0 - l.y_m(static_cast<double>(j))) / source.dy; };
     for (const DrawItem& item : frame.draws) {
         drawn.set(item, frame.arena.vertices(item.height_slot));
         const LatticePoint corner = l.corner(item.tile);
         const std::int64_t extent = l.tile_extent(item.tile.level);
         const auto last = static_cast<double>(extent);
-        const Range columns(column_at(corner.i), column_at(std::min(corner.i + extent, l.cells_x)), source.columns);
-        const Range rows(row_at(corner.j), row_at(std::min(corner.j + extent, l.cells_y)), source.rows);
-        for (std::int64_t row = rows.first; row < rows.end; ++row)
-            for (std::int64_t column = columns.first; column < columns.end; ++column) {
-                const double height_m = source.at(column, row);
-                if (std::isnan(height_m) || !is_drawn(source, column, row)) continue;
-                const glm::dvec3 truth{source.x0 + static_cast<double>(column) * source.dx,
-                                       source.y0 - static_cast<double>(row) * source.dy, height_m};
-                const double i = l.i_of(truth.x), j = l.j_of(truth.y);
-                // Only a tile's last lines may be another's.
-                if ((row + 1 == rows.end || column + 1 == columns.end) &&
-                    !tiles.owns(item.tile, i, j, slack_i, slack_j))
-                    continue;
-                const double u = std::clamp(i - static_cast<double>(corner.i), 0.0, last);
-                const double v = std::clamp(j - static_cast<double>(corner.j), 0.0, last);
-                const auto px = judge.error_px(truth, drawn, u, v);
-                if (!px) continue;
-                errors.add(*px);
-                excess_px = std::max(excess_px, *px - stated_m * judge.px_per_m(truth));
-            }
+        const double west = static_cast<double>(corner.i), north = static_cast<double>(corner.j);
+        const PlaneRect where{l.x_m(west), l.y_m(static_cast<double>(std::min(corner.j + extent, l.cells_y))),
+                              l.x_m(static_cast<double>(std::min(corner.i + extent, l.cells_x))), l.y_m(north)};
+        source.index().find(where, source.slack_m(), [&](const SampleRect& samples, bool inside) {
+            for (std::int64_t row = samples.row; row < samples.row + samples.rows; ++row)
+                for (std::int64_t column = samples.column; column < samples.column + samples.columns; ++column) {
+                    if (!source.judged(column, row)) continue;
+                    const double height_m = layer.at(column, row);
+                    if (std::isnan(height_m)) continue;
+                    const SourcePoint at = layer.position(static_cast<double>(column), static_cast<double>(row));
+                    const double i = l.i_of(at.x), j = l.j_of(at.y);
+                    if (!inside && !tiles.owns(item.tile, i, j, slack)) continue;
+                    const glm::dvec3 truth{at.x, at.y, height_m};
+                    const auto px =
+                        judge.error_px(truth, drawn, std::clamp(i - west, 0.0, last), std::clamp(j - north, 0.0, last));
+                    if (!px) continue;
+                    errors.add(*px);
+                    excess_px = std::max(excess_px, *px - stated_m * judge.px_per_m(truth));
+                }
+        });
     }
 }
 

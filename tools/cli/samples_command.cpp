@@ -34,7 +34,7 @@ namespace {
 constexpr std::uint32_t kVersion = 2;
 constexpr std::int64_t kBandRows = RasterSpool<float>::kBlock;
 constexpr std::int64_t kWindowColumns = 64 * RasterSpool<float>::kBlock;
-constexpr std::int64_t kMaxSide = std::int64_t{1} << 30;
+constexpr std::int64_t kMaxSide = (std::int64_t{1} << 30) + 1;       // as along the largest lattice
 constexpr std::int64_t kLeastMemoryBytes = std::int64_t{192} << 20;  // as for a build: most of it is OpenImageIO itself
 
 struct SamplesOptions {
