@@ -109,7 +109,7 @@ Result<void> spool_stack(const BuildPlan& plan, const HeightStack& stack, Height
 
 // Interior voids get heights; what was left is said.
 Result<void> fill_voids(const BuildPlan& plan, const BuildOptions& options, const HeightUnits& units,
-                        HeightSpool& spool, const std::atomic<bool>& stop, BuildReport& report) {
+                        HeightSpool& spool, const std::atomic<bool>& stop, BuildReport& report, HeightRange& range) {
     FillRule rule = options.fill;
     rule.integer = plan.integer_heights;
     if (rule.kind == FillRule::Kind::value) rule.value = (rule.value - units.offset_m) / units.scale;
