@@ -57,7 +57,7 @@ TEST_F(Warped, ADemInDegreesIsBuiltInItsUtmZoneAndWithinWhatIsStatedOfItsFile) {
     const auto built = build_store_from({dem_}, store_);
     EXPECT_EQ(report_of(scree({"info", store_, "--json", "-"})).value("crs", ""), "EPSG:32633");
     expect_verified();
-    expect_kept({dem_}, 50000);
+    expect_kept({dem_}, 20000);
     // At most what linear interpolation over a cell and a sample's distance loses of waves of 20 samples, each way.
     const double error_m = built.value("warp_error_m", -1.0), rms_m = built.value("warp_rms_m", -1.0);
     EXPECT_GT(error_m, rms_m);
