@@ -31,6 +31,7 @@ namespace {
 constexpr char kMagic[] = {'S', 'C', 'R', 'E', 'E', 'S', 'M', 'P'};
 constexpr std::uint32_t kVersion = 2;
 constexpr std::uint32_t kMaxNameBytes = 4096;
+constexpr std::uint32_t kMaxNames = 1 << 20;
 constexpr std::uint64_t kMaxSide = (std::uint64_t{1} << 30) + 1;  // samples along a side of the largest lattice
 constexpr double kFarthestM = 1e9;                                // of a lattice
 constexpr auto kPatience = std::chrono::milliseconds(5);          // between looks at the child
@@ -94,7 +95,8 @@ private:
 
     Result<void> read_names(SourceLayer& l) {
         const std::uint32_t count = in_.u32();
-        if (in_.ok() && count == 0) return bad("no file in it");
+        if (in_.ok() && (count == 0 || count > kMaxNames))
+            return bad(fmt::format("a layer of {} files; 1 to {} are sound", count, kMaxNames));
         for (std::uint32_t k = 0; k < count && in_.ok(); ++k) {  // ends at the file's end, however large the count
             const std::uint32_t bytes = in_.u32();
             if (in_.ok() && bytes > kMaxNameBytes)
