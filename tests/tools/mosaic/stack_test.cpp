@@ -145,7 +145,11 @@ TEST_F(Stacks, AVoidIsToldFromWhatNoFileReaches) {
             // Point (i, j) is at column i + 0.3, row j + 0.4.
             const bool inside = i >= 0 && j >= 0 && i + 0.3 <= 63 && j + 0.4 <= 63;
             const bool in_void = i >= 20 && i < 40 && j >= 20 && j < 40;
-            if (!inside)
+            // Half a sample beyond the last one a point is void: a seam that narrow may be filled.
+            const bool beside = !inside && i >= 0 && j >= 0 && i <= 63 && j <= 63;
+            if (beside)
+                ASSERT_TRUE(std::isnan(v)) << i << ", " << j;
+            else if (!inside)
                 ASSERT_EQ(v, kUncovered) << i << ", " << j;
             else if (in_void)
                 ASSERT_TRUE(std::isnan(v)) << i << ", " << j;
