@@ -73,7 +73,9 @@ TEST_F(ExitCodes, WrongUseIsTwo) {
         {"build", dem_, "-o", other_, "--height-scale", "0"},
         {"build", dem_, "-o", other_, "--height-scale", "nan"},
         {"build", dem_, "-o", other_, "--height-quantum", "-1"},
-        {"build", dem_, "-o", other_, "--spacing", "30"},
+        {"build", dem_, "-o", other_, "--spacing", "0"},
+        {"build", dem_, "-o", other_, "--fill", "rough"},
+        {"build", dem_, "-o", other_, "--resampling", "lanczos"},
         {"info"},
         {"info", store_, "--bogus"},
         {"height"},
@@ -118,16 +120,13 @@ TEST_F(ExitCodes, WrongUseIsTwo) {
     EXPECT_FALSE(std::filesystem::exists(other_));
 }
 
-TEST_F(ExitCodes, MoreThanOneSourceIsLater) {
-    expect_refused(scree({"build", dem_, dem_, "-o", other_}), kUsage, {"later"});
-    expect_refused(scree({"build", dem_, "--imagery", "a.tif", "b.tif", "-o", other_}), kUsage, {"later"});
-}
-
 TEST_F(ExitCodes, InputsThatCannotBeUsedAreThreeAndNamed) {
     const std::string missing = folder_.file("missing.tif");
     expect_refused(scree({"build", missing, "-o", other_, "--quiet"}), kInput, {missing});
     expect_refused(scree({"build", dem_, "--imagery", missing, "-o", other_, "--quiet"}), kInput, {missing});
-    expect_refused(scree({"build", folder_.file(""), "-o", other_, "--quiet"}), kInput, {folder_.file("")});
+    const std::string hollow = folder_.file("hollow");
+    std::filesystem::create_directory(hollow);
+    expect_refused(scree({"build", hollow, "-o", other_, "--quiet"}), kInput, {hollow});
     const std::string text = folder_.file("text.tif");
     write_bytes(text, {'h', 'e', 'l', 'l', 'o'});
     expect_refused(scree({"build", text, "-o", other_, "--quiet"}), kInput, {text});
@@ -136,7 +135,9 @@ TEST_F(ExitCodes, InputsThatCannotBeUsedAreThreeAndNamed) {
 
     const std::string geographic = folder_.file("degrees.tif");
     write_geographic_heights(geographic, hills(20, 20, 2));
-    expect_refused(scree({"build", geographic, "-o", other_, "--quiet"}), kInput, {geographic, "degrees", "EPSG:4326"});
+    expect_refused(scree({"build", geographic, "--crs", "EPSG:4326", "-o", other_, "--quiet"}), kUsage,
+                   {"--crs", "metres"});
+    expect_refused(scree({"build", geographic, "--crs", "EPSG:999999", "-o", other_, "--quiet"}), kUsage, {"--crs"});
 
     const std::string bare = folder_.file("bare.tif");
     write_heights_u16(bare, hills(20, 20, 2), nullptr);
@@ -165,7 +166,8 @@ TEST_F(ExitCodes, InputsThatCannotBeUsedAreThreeAndNamed) {
                    {image, "does not meet"});
     expect_refused(scree({"build", image, "-o", other_, "--quiet"}), kInput, {image, "3 channels"});
     write_image(image, 40, 40, 3, 8, &other_zone, patchwork);
-    expect_refused(scree({"build", dem_, "--imagery", image, "-o", other_, "--quiet"}), kInput, {image, "EPSG:32634"});
+    expect_refused(scree({"build", dem_, "--imagery", image, "-o", other_, "--quiet"}), kInput,
+                   {image, "does not meet"});
     write_image(image, 40, 40, 3, 8, nullptr, patchwork);
     expect_refused(scree({"build", dem_, "--imagery", image, "-o", other_, "--quiet"}), kInput,
                    {image, "georeference"});

@@ -81,7 +81,8 @@ TEST(Height, IsTheSourcesOnVerticesEdgesAndInside) {
         for (int i = 40; i < 60; ++i) grid.at(i, j) = -9999;
     const Place place;
     write_heights(folder.file("d.tif"), grid, place, "-9999");
-    build_store_from({folder.file("d.tif"), "--tile-size", "9", "--texture-size", "16"}, folder.file("d.scree"));
+    build_store_from({folder.file("d.tif"), "--tile-size", "9", "--texture-size", "16", "--fill", "none"},
+                     folder.file("d.scree"));
     const auto questions = questions_on(grid, random);
     write_file(folder.file("q.csv"), csv_of(questions, place));
     const auto told = told_by(scree({"height", folder.file("d.scree"), "--file", folder.file("q.csv")}));
@@ -139,7 +140,8 @@ class HeightCommand : public ::testing::Test {
 protected:
     void SetUp() override {
         write_heights(folder_.file("d.tif"), grid_, place_);
-        build_store_from({folder_.file("d.tif"), "--tile-size", "9", "--texture-size", "16"}, store_);
+        build_store_from({folder_.file("d.tif"), "--tile-size", "9", "--texture-size", "16", "--crs", "EPSG:32633"},
+                         store_);
     }
     TemporaryFolder folder_;
     std::string store_ = folder_.file("d.scree");

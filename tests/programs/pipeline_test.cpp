@@ -71,7 +71,7 @@ TEST(Pipeline, NodataTagOfAnIntegerFileIsVoidAndHeightsStayLossless) {
     for (int j = 30; j < 50; ++j)
         for (int i = 10; i < 33; ++i) grid.at(i, j) = -32768;
     write_heights_i16(folder.file("d.tif"), grid, {}, "-32768");
-    build_store_from({folder.file("d.tif")}, folder.file("d.scree"));
+    build_store_from({folder.file("d.tif"), "--fill", "none"}, folder.file("d.scree"));
     const auto info = expect_sound_store(folder.file("d.scree"), {1}, {"4M"});
     EXPECT_EQ(info["present_cells"], 69 * 89 - 24 * 21);
     EXPECT_EQ(info["height_quantum_m"], 1.0);
