@@ -24,6 +24,7 @@
 #include "tools/cli/height_options.h"
 #include "tools/partial_file.h"
 #include "tools/progress.h"
+#include "tools/source/isolated_decoder.h"
 
 namespace scree {
 namespace {
@@ -234,8 +235,10 @@ Result<std::vector<Block>> write_descriptor(const SamplesOptions& o, Progress& p
 
 std::string json_of(const std::vector<Block>& blocks, double seconds) {
     const ProcessUsage usage = process_usage();
-    nlohmann::ordered_json json = {
-        {"seconds", seconds}, {"cpu_seconds", usage.cpu_seconds}, {"peak_rss_bytes", usage.peak_rss_bytes}};
+    const DecoderUsage decoders = decoder_usage();
+    nlohmann::ordered_json json = {{"seconds", seconds},
+                                   {"cpu_seconds", usage.cpu_seconds + decoders.cpu_seconds},
+                                   {"peak_rss_bytes", usage.peak_rss_bytes + decoders.peak_rss_bytes}};
     for (const Block& b : blocks) {
         nlohmann::ordered_json source = {{"name", b.name},
                                          {"first_m", {b.place.x_m, b.place.y_m}},

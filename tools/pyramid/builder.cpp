@@ -26,6 +26,7 @@
 #include "tools/pyramid/imagery_rows.h"
 #include "tools/pyramid/texture_pyramid.h"
 #include "tools/pyramid/tint.h"
+#include "tools/source/isolated_decoder.h"
 
 namespace scree {
 namespace {
@@ -255,8 +256,9 @@ Result<BuildReport> build_store(BuildPlan plan, const BuildOptions& options, con
     BuildReport report;
     report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     const ProcessUsage usage = process_usage();
-    report.cpu_seconds = usage.cpu_seconds;
-    report.peak_rss_bytes = usage.peak_rss_bytes;
+    const DecoderUsage decoders = decoder_usage();
+    report.cpu_seconds = usage.cpu_seconds + decoders.cpu_seconds;
+    report.peak_rss_bytes = usage.peak_rss_bytes + decoders.peak_rss_bytes;
     report.source_megapixels = dem_pixels + image_pixels;
     report.height_tiles = d.height_tiles;
     report.texture_tiles = d.texture_tiles;

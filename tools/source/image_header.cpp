@@ -13,7 +13,7 @@
 #include <string_view>
 #include <vector>
 
-#include <OpenImageIO/half.h>
+#include <Imath/half.h>
 #include <fmt/format.h>
 #include <tiffio.h>
 

@@ -14,6 +14,7 @@
 #include <fmt/format.h>
 
 #include "tools/source/image_header.h"
+#include "tools/source/isolated_decoder.h"
 #include "tools/source/pixel_decoder.h"
 
 namespace scree {
@@ -23,6 +24,8 @@ constexpr int kMaxChannels = 1024;
 // Units smaller than this are read several at a time: a call of the decoder costs about as much as decoding 64 KiB.
 constexpr std::int64_t kBandTargetBytes = std::int64_t{1} << 20;
 constexpr std::int64_t kMiB = std::int64_t{1} << 20;
+// Measured: what decoders take for themselves, whatever the size of the image, is below 20 MiB.
+constexpr std::int64_t kDecoderBytes = 64 * kMiB;
 
 Error unusable(const std::string& path, const std::string& what) {
     return {ErrorCode::input, fmt::format("{}: {}", path, what)};
@@ -82,7 +85,7 @@ std::uint8_t divided_by_alpha(std::uint8_t colour, std::uint8_t alpha) {
 
 class DecodedSource final : public ImageSource {
 public:
-    DecodedSource(std::string path, const ImageHeader& header, std::unique_ptr<PixelDecoder> decoder)
+    DecodedSource(std::string path, const ImageHeader& header, std::unique_ptr<IsolatedDecoder> decoder)
         : path_(std::move(path)), header_(header), decoder_(std::move(decoder)) {}
 
     Result<void> prepare(const OpenOptions& options) {
@@ -182,7 +185,7 @@ private:
             if (row < band_begin_ || row >= band_end_) {
                 if (Result<void> loaded = load_band(row - row % band_rows_); !loaded) return loaded;
             }
-            use(row, band_.data() + (row - band_begin_) * row_bytes_);
+            use(row, band_ + (row - band_begin_) * row_bytes_);
         }
         return {};
     }
@@ -190,13 +193,12 @@ private:
     Result<void> load_band(std::int64_t begin) {
         const std::int64_t end = std::min(begin + band_rows_, info_.height);
         band_begin_ = band_end_ = 0;  // a failure leaves nothing that could be taken for pixels
-        try {
-            band_.resize(static_cast<std::size_t>(saturating_product(row_bytes_, end - begin)));
-            if (Result<void> decoded = decoder_->decode(begin, end, band_.data()); !decoded)
-                return unreadable(begin, end, decoded.error().message);
-        } catch (const std::exception& problem) {
-            return unreadable(begin, end, problem.what());
+        const Result<const std::byte*> decoded = decoder_->decode(begin, end);
+        if (!decoded) {
+            if (decoded.error().code != ErrorCode::input) return decoded.error();
+            return unreadable(begin, end, decoded.error().message);
         }
+        band_ = *decoded;
         band_begin_ = begin;
         band_end_ = end;
         return {};
@@ -209,18 +211,28 @@ private:
 
     std::string path_;
     ImageHeader header_;
-    std::unique_ptr<PixelDecoder> decoder_;
+    std::unique_ptr<IsolatedDecoder> decoder_;
     ImageInfo info_;
     std::optional<Georeference> georeference_;
     std::int64_t row_bytes_ = 0;
     std::int64_t band_rows_ = 1;
     int shift_ = 0;
-    std::vector<std::byte> band_;  ///< rows [band_begin_, band_end_), all channels, as decoded
+    const std::byte* band_ = nullptr;  ///< the decoder's: rows [band_begin_, band_end_), all channels, as decoded
     std::int64_t band_begin_ = 0;
     std::int64_t band_end_ = 0;
 };
 
+// Whole frames take several times their size while they are decoded.
+DecoderLimits limits_of(const OpenOptions& options) {
+    DecoderLimits limits;
+    if (options.max_unit_bytes < std::numeric_limits<std::int64_t>::max() / 8)
+        limits.memory_bytes = kDecoderBytes + 4 * options.max_unit_bytes;
+    return limits;
+}
+
 Result<std::unique_ptr<ImageSource>> open_image(const std::string& path, const OpenOptions& options) {
+    const DecoderLimits limits = limits_of(options);
+    if (Result<void> tried = try_headers(path, limits); !tried) return tried.error();
     Result<ImageHeader> header = read_image_header(path);
     if (!header) return header.error();
     if (header->rows_per_strip == header->height && header->height > 0) {
@@ -234,8 +246,7 @@ Result<std::unique_ptr<ImageSource>> open_image(const std::string& path, const O
                     "at least {} MiB for it, or store the file in tiles",
                     header->width, header->height, options.max_unit_bytes / kMiB, least / kMiB + 1));
     }
-    Result<std::unique_ptr<PixelDecoder>> decoder =
-        header->plain_tiff ? make_tiff_decoder(path, *header) : make_openimageio_decoder(path, *header);
+    Result<std::unique_ptr<IsolatedDecoder>> decoder = open_isolated_decoder(path, *header, limits);
     if (!decoder) return decoder.error();
     auto source = std::make_unique<DecodedSource>(path, *header, std::move(*decoder));
     if (Result<void> prepared = source->prepare(options); !prepared) return prepared.error();
@@ -246,12 +257,6 @@ Result<std::unique_ptr<ImageSource>> open_image(const std::string& path, const O
 }
 
 }  // namespace
-
-std::size_t memory_bytes(SampleType type) {
-    std::size_t bytes = 0;
-    with_memory_type(type, [&](auto sample) { bytes = sizeof(sample); });
-    return bytes;
-}
 
 bool is_integer(SampleType type) {
     return type != SampleType::f16 && type != SampleType::f32 && type != SampleType::f64;

@@ -34,6 +34,9 @@ public:
     virtual Result<void> decode(std::int64_t begin, std::int64_t end, std::byte* out) = 0;
 };
 
+/// What every file needs of OpenImageIO, ahead of the first one.
+void load_openimageio();
+
 /// Both return Errors (ErrorCode::input) with whole messages. make_tiff_decoder needs header.plain_tiff.
 Result<std::unique_ptr<PixelDecoder>> make_tiff_decoder(const std::string& path, const ImageHeader& header);
 Result<std::unique_ptr<PixelDecoder>> make_openimageio_decoder(const std::string& path, const ImageHeader& header);

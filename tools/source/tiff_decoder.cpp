@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include <OpenImageIO/half.h>
+#include <Imath/half.h>
 #include <fmt/format.h>
 #include <tiffio.h>
 
@@ -153,6 +153,27 @@ private:
 };
 
 }  // namespace
+
+std::size_t memory_bytes(SampleType type) {
+    switch (type) {
+        case SampleType::u8:
+        case SampleType::i8:
+            return 1;
+        case SampleType::u16:
+        case SampleType::i16:
+            return 2;
+        case SampleType::u32:
+        case SampleType::i32:
+        case SampleType::f16:  // widened
+        case SampleType::f32:
+            return 4;
+        case SampleType::u64:
+        case SampleType::i64:
+        case SampleType::f64:
+            return 8;
+    }
+    return 0;
+}
 
 Result<std::unique_ptr<PixelDecoder>> make_tiff_decoder(const std::string& path, const ImageHeader& header) {
     auto file = std::make_unique<TiffFile>(path, "rm");
