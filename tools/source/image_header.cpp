@@ -318,9 +318,14 @@ const char* reader_name(ImageKind kind) {
 }
 
 Result<ImageHeader> read_image_header(const std::string& path) {
-    std::error_code status;
-    if (!std::filesystem::exists(path, status)) return unusable(path, "no such file, so there is nothing to read");
-    if (!std::filesystem::is_regular_file(path, status))
+    std::error_code problem;
+    const std::filesystem::file_type type = std::filesystem::status(path, problem).type();
+    if (type == std::filesystem::file_type::not_found)
+        return unusable(path, "no such file, so there is nothing to read");
+    if (type == std::filesystem::file_type::none)
+        return unusable(path, fmt::format("cannot be reached ({})", problem.message()));
+    if (type == std::filesystem::file_type::directory) return unusable(path, "a folder, not an image");
+    if (type != std::filesystem::file_type::regular)
         return unusable(path, "not a regular file, so it cannot be read as an image");
     std::ifstream file(path, std::ios::binary);
     if (!file) return unusable(path, "cannot be opened for reading");

@@ -251,6 +251,8 @@ public:
             if (!wait(wall_seconds))
                 return no_answer(fmt::format("gave no answer within {} s and was stopped", wall_seconds));
             auto message = receive_message<Answer>(socket_.get());
+            if (!message && process_ == 0)
+                return Error{ErrorCode::io, fmt::format("{} ended before it saw a file", program_name(library_))};
             if (!message) return no_answer("ended without an answer");
             const Answer& answer = message->head;
             switch (answer.kind) {
