@@ -198,7 +198,11 @@ std::optional<std::vector<T>> by_gdal(const std::string& file, const std::string
 
 // What is read otherwise than by GDAL, and why that is meant.
 const std::map<std::string, std::string>& meant_otherwise() {
-    static const std::map<std::string, std::string> files = {};
+    static const std::map<std::string, std::string> files = {
+        {"bug4468.tif", "colours that were multiplied by alpha are divided by it"},
+        {"byte_rle8.bmp", "a palette of greys gives its greys"},
+        {"zoo__openjpeg__nonregression__issue458.jp2", "five bits fill eight"},
+    };
     return files;
 }
 
@@ -217,7 +221,9 @@ TEST_F(HostileFiles, SamplesAreThoseOfGdal) {
             ++heights.read;
         }
         const std::int64_t count = ours->width * ours->height;
-        const auto first = by_gdal<double>(file, scratch, "Float64", {"1"}, count);
+        // More than two channels are refused as heights; some are a palette's, of which GDAL gives places.
+        std::optional<std::vector<double>> first;
+        if (ours->channels <= 2) first = by_gdal<double>(file, scratch, "Float64", {"1"}, count);
         const auto name = std::filesystem::path(file).filename().string();
         const bool excused = meant_otherwise().contains(name);
         if (first) {

@@ -114,6 +114,8 @@ Result<void> check_tiff_layout(const std::string& path, TIFF* file, ImageHeader&
     } else if (!type && photometric != PHOTOMETRIC_PALETTE) {
         header.significant_bits = bits;
     }
+    header.inverted_by_decoder =
+        !header.plain_tiff && photometric == PHOTOMETRIC_MINISWHITE && bits <= 8 && format == SAMPLEFORMAT_UINT;
 
     std::uint16_t extra_count = 0;
     std::uint16_t* extra = nullptr;
@@ -176,7 +178,11 @@ Result<void> read_png_header(const std::string& path, std::string_view start, Im
     const auto* bytes = reinterpret_cast<const unsigned char*>(start.data());
     header.width = big_endian(bytes + 16, 4);
     header.height = big_endian(bytes + 20, 4);
-    header.rows_per_strip = bytes[28] != 0 ? header.height : 1;
+    header.interlaced = bytes[28] != 0;
+    header.rows_per_strip = header.interlaced ? header.height : 1;
+    const int bits = bytes[24];
+    const bool grey = bytes[25] == 0 || bytes[25] == 4;
+    if (grey && bits < 8) header.significant_bits = bits;
     return check_sides(path, header.width, header.height);
 }
 
@@ -250,6 +256,16 @@ Result<void> read_jpeg2000_header(const std::string& path, ImageHeader& header) 
     header.width = std::int64_t{big_endian(bytes + 8, 4)} - big_endian(bytes + 16, 4);
     header.height = std::int64_t{big_endian(bytes + 12, 4)} - big_endian(bytes + 20, 4);
     header.rows_per_strip = header.height;
+    // Of the first component: bit depth - 1, and whether it is signed.
+    if (text.size() - siz < 43) return unusable(path, "the JPEG 2000 file ends within its codestream header");
+    const int bits = (bytes[42] & 0x7F) + 1;
+    if ((bytes[42] & 0x80) != 0)
+        return unusable(path,
+                        fmt::format("its samples are signed {}-bit integers, which are not read from JPEG 2000", bits));
+    if (bits > 16)
+        return unusable(path,
+                        fmt::format("its samples are {}-bit integers; of JPEG 2000 up to 16 bits are read", bits));
+    if (bits != 8 && bits != 16) header.significant_bits = bits;
     return check_sides(path, header.width, header.height);
 }
 

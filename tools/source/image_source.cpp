@@ -169,7 +169,9 @@ private:
                 for (std::int64_t column = 0; column < info_.width; ++column, from += info_.channels) {
                     // Samples of odd widths arrive stretched over their type's range; their own bits are the upper
                     // ones.
-                    if constexpr (std::is_integral_v<T>)
+                    if constexpr (std::is_same_v<T, std::uint8_t>)
+                        to[column] = static_cast<Out>((header_.inverted_by_decoder ? 255 - *from : *from) >> shift_);
+                    else if constexpr (std::is_integral_v<T>)
                         to[column] = static_cast<Out>(shift_ == 0 ? *from : static_cast<T>(*from >> shift_));
                     else
                         to[column] = static_cast<Out>(*from);
