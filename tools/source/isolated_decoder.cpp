@@ -202,15 +202,17 @@ Server& server_of(Library library) {
 
 // --- one process ---
 
-// D in stat(5): in a system call that waits for a disk or a file server, which is no fault of the file.
-bool waits_for_disk(pid_t process) {
+// By its state in stat(5): R computes, which has a limit of its own; D is in a system call that waits for a disk or a
+// file server, which is no fault of the file.
+bool is_busy(pid_t process) {
     std::string text(512, '\0');
     const Descriptor file(::open(fmt::format("/proc/{}/stat", process).c_str(), O_RDONLY | O_CLOEXEC));
     const ssize_t bytes = file.valid() ? ::read(file.get(), text.data(), text.size()) : -1;
     if (bytes <= 0) return false;
     text.resize(static_cast<std::size_t>(bytes));
     const std::size_t name_end = text.rfind(')');
-    return name_end != std::string::npos && name_end + 2 < text.size() && text[name_end + 2] == 'D';
+    return name_end != std::string::npos && name_end + 2 < text.size() &&
+           (text[name_end + 2] == 'R' || text[name_end + 2] == 'D');
 }
 
 std::string describe_death(int status, std::int64_t cpu_seconds) {
@@ -289,7 +291,7 @@ private:
             if (ready > 0) return true;
             if (ready < 0 && errno != EINTR) return false;
             // A program that was stopped and goes on finds its time over and the answer there.
-            if (ready == 0 && ::poll(&polled, 1, 0) <= 0 && !waits_for_disk(process_)) return false;
+            if (ready == 0 && ::poll(&polled, 1, 0) <= 0 && !is_busy(process_)) return false;
         }
     }
 

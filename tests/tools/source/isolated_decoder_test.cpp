@@ -70,7 +70,7 @@ protected:
         DecoderLimits limits;
         limits.memory_bytes = std::int64_t{64} << 20;
         limits.cpu_seconds = 1;
-        limits.wall_seconds = kSanitized ? 1 : 4;  // times ten
+        limits.wall_seconds = kSanitized ? 1 : 10;  // times ten
         return limits;
     }
     // Every sample of row r is r + 1.
