@@ -178,8 +178,7 @@ Result<void> read_png_header(const std::string& path, std::string_view start, Im
     const auto* bytes = reinterpret_cast<const unsigned char*>(start.data());
     header.width = big_endian(bytes + 16, 4);
     header.height = big_endian(bytes + 20, 4);
-    header.interlaced = bytes[28] != 0;
-    header.rows_per_strip = header.interlaced ? header.height : 1;
+    header.rows_per_strip = bytes[28] != 0 ? header.height : 1;
     const int bits = bytes[24];
     const bool grey = bytes[25] == 0 || bytes[25] == 4;
     if (grey && bits < 8) header.significant_bits = bits;

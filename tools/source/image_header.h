@@ -28,7 +28,6 @@ struct ImageHeader {
     std::int64_t height = 0;
     std::int64_t rows_per_strip = 1;   ///< rows that are decoded together; height when only the whole frame can be
     int significant_bits = 0;          ///< bits a sample holds in the file when fewer than its type has, else 0
-    bool interlaced = false;           ///< PNG only
     bool inverted_by_decoder = false;  ///< 8-bit samples come as 255 - what the file holds: white is zero there
     std::optional<PlainTiff> plain_tiff;
     int alpha_channel = -1;             ///< TIFF only: from ExtraSamples

@@ -1,4 +1,3 @@
-#include <bit>
 #include <limits>
 #include <mutex>
 #include <optional>
@@ -73,11 +72,6 @@ public:
                    *type,           spec_.tile_width > 0 ? spec_.tile_height : 0};
         // Half to float is the one conversion that OpenImageIO does without rescaling; integers are taken as they are.
         format_ = *type == SampleType::f16 ? OIIO::TypeDesc(OIIO::TypeDesc::FLOAT) : spec_.format;
-#if OIIO_VERSION_MAJOR == 2 && OIIO_VERSION_MINOR == 4
-        // Interlaced ones come in the file's byte order, which those by lines do not.
-        big_endian_ = std::endian::native == std::endian::little && header.kind == ImageKind::png &&
-                      header.interlaced && *type == SampleType::u16;
-#endif
         return {};
     }
 
@@ -91,24 +85,16 @@ public:
                                                    spec_.nchannels, format_, out)
                               : input_->read_scanlines(0, 0, y_begin, y_end, 0, 0, spec_.nchannels, format_, out);
         // Some readers report a damaged strip but claim success.
-        if (read && !input_->has_error()) {
-            if (big_endian_) swap_bytes(out, (end - begin) * layout_.width * layout_.channels);
-            return {};
-        }
+        if (read && !input_->has_error()) return {};
         const std::string reason = input_->geterror();
         return Error{ErrorCode::input, reason.empty() ? "no reason given" : reason};
     }
 
 private:
-    static void swap_bytes(std::byte* samples, std::int64_t count) {
-        for (std::int64_t i = 0; i < count; ++i, samples += 2) std::swap(samples[0], samples[1]);
-    }
-
     std::unique_ptr<OIIO::ImageInput> input_;
     OIIO::ImageSpec spec_;
     OIIO::TypeDesc format_;
     DecodedLayout layout_;
-    bool big_endian_ = false;
 };
 
 void configure_openimageio() {
