@@ -108,6 +108,9 @@ Result<void> Dataset::check() const {
                             lattice.tiles_y(texture_deepest_level) - 1}))
         return store_error(fmt::format("dataset: texture level {} with {} roots passes the format's keys",
                                        texture_deepest_level, lattice.root_rows * lattice.root_columns));
+    if (coarsest_leaf_level && (*coarsest_leaf_level < 0 || *coarsest_leaf_level >= lattice.deepest_level))
+        return store_error(fmt::format("dataset: coarsest leaf level {} is not above the deepest level {}",
+                                       *coarsest_leaf_level, lattice.deepest_level));
     if (height_tiles < 1 || texture_tiles < 1 || present_cells < 1)
         return store_error("dataset: a store holds at least one tile of each kind and one present cell");
     return {};
@@ -118,33 +121,34 @@ std::string dataset_to_json(const Dataset& d) {
     for (const SourceRecord& s : d.sources)
         sources.push_back(
             {{"name", s.name}, {"role", s.role}, {"bytes", s.bytes}, {"width", s.width}, {"height", s.height}});
-    const Json json = {{"format_version", kFormatVersion},
-                       {"origin_x_m", d.lattice.origin_x_m},
-                       {"origin_y_m", d.lattice.origin_y_m},
-                       {"spacing_m", d.lattice.spacing_m},
-                       {"cells_x", d.lattice.cells_x},
-                       {"cells_y", d.lattice.cells_y},
-                       {"deepest_level", d.lattice.deepest_level},
-                       {"tile_cells_log2", d.lattice.tile_cells_log2},
-                       {"root_rows", d.lattice.root_rows},
-                       {"root_columns", d.lattice.root_columns},
-                       {"crs", d.crs},
-                       {"crs_name", d.crs_name},
-                       {"vertical_datum", d.vertical_datum},
-                       {"height_offset_m", d.height_offset_m},
-                       {"height_quantum_m", d.height_quantum_m},
-                       {"height_quantum_error_m", d.height_quantum_error_m},
-                       {"warp_error_m", d.warp_error_m},
-                       {"min_height_m", d.min_height_m},
-                       {"max_height_m", d.max_height_m},
-                       {"texture_size_log2", d.texture_size_log2},
-                       {"texture_deepest_level", d.texture_deepest_level},
-                       {"has_imagery", d.has_imagery},
-                       {"height_tiles", d.height_tiles},
-                       {"texture_tiles", d.texture_tiles},
-                       {"present_cells", d.present_cells},
-                       {"sources", sources},
-                       {"attribution", d.attribution}};
+    Json json = {{"format_version", kFormatVersion},
+                 {"origin_x_m", d.lattice.origin_x_m},
+                 {"origin_y_m", d.lattice.origin_y_m},
+                 {"spacing_m", d.lattice.spacing_m},
+                 {"cells_x", d.lattice.cells_x},
+                 {"cells_y", d.lattice.cells_y},
+                 {"deepest_level", d.lattice.deepest_level},
+                 {"tile_cells_log2", d.lattice.tile_cells_log2},
+                 {"root_rows", d.lattice.root_rows},
+                 {"root_columns", d.lattice.root_columns},
+                 {"crs", d.crs},
+                 {"crs_name", d.crs_name},
+                 {"vertical_datum", d.vertical_datum},
+                 {"height_offset_m", d.height_offset_m},
+                 {"height_quantum_m", d.height_quantum_m},
+                 {"height_quantum_error_m", d.height_quantum_error_m},
+                 {"warp_error_m", d.warp_error_m},
+                 {"min_height_m", d.min_height_m},
+                 {"max_height_m", d.max_height_m},
+                 {"texture_size_log2", d.texture_size_log2},
+                 {"texture_deepest_level", d.texture_deepest_level},
+                 {"has_imagery", d.has_imagery},
+                 {"height_tiles", d.height_tiles},
+                 {"texture_tiles", d.texture_tiles},
+                 {"present_cells", d.present_cells},
+                 {"sources", sources},
+                 {"attribution", d.attribution}};
+    if (d.coarsest_leaf_level) json["coarsest_leaf_level"] = *d.coarsest_leaf_level;
     return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
@@ -176,6 +180,7 @@ Result<Dataset> dataset_from_json(const std::string& text) {
     fields.read("warp_error_m", d.warp_error_m);
     fields.read("min_height_m", d.min_height_m);
     fields.read("max_height_m", d.max_height_m);
+    if (json.contains("coarsest_leaf_level")) fields.read("coarsest_leaf_level", d.coarsest_leaf_level.emplace());
     fields.read("texture_size_log2", d.texture_size_log2);
     fields.read("texture_deepest_level", d.texture_deepest_level);
     fields.read("has_imagery", d.has_imagery);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,13 +35,16 @@ struct Dataset {
     double min_height_m = 0;            ///< over valid source samples
     double max_height_m = 0;
 
+    /// Level of the coarsest leaf where it is not the lattice's deepest: the heights' depth varies by place.
+    std::optional<int> coarsest_leaf_level;
+
     int texture_size_log2 = 8;
     int texture_deepest_level = 0;
     bool has_imagery = false;  ///< false: a tint made from the heights
 
     std::int64_t height_tiles = 0;
     std::int64_t texture_tiles = 0;
-    std::int64_t present_cells = 0;  ///< finest cells whose four samples were valid
+    std::int64_t present_cells = 0;  ///< cells of leaves, each of its own size, whose four samples were valid
 
     std::vector<SourceRecord> sources;
     std::string attribution;
@@ -50,6 +54,8 @@ struct Dataset {
     double texel_m(int level) const;
     /// Largest of height and texture depth.
     int deepest_level() const;
+    /// Level of the coarsest leaf of the heights.
+    int least_leaf_level() const { return coarsest_leaf_level.value_or(lattice.deepest_level); }
     double height_m(double n) const { return height_offset_m + n * height_quantum_m; }
 
     Result<void> check() const;

@@ -8,8 +8,8 @@ packages=(
     ca-certificates cmake g++ git ninja-build pkg-config
     # both programs
     libcli11-dev libfmt-dev libsqlite3-dev libssl-dev libxxhash-dev libzstd-dev nlohmann-json3-dev
-    # scree: images in, georeference (libgeotiff brings PROJ), the pipeline
-    libgeotiff-dev libimath-dev libopenimageio-dev libtbb-dev libtiff-dev
+    # scree: images in, georeference and CRS (libproj-dev brings the registry, proj-data), the pipeline
+    libgeotiff-dev libimath-dev libopenimageio-dev libproj-dev libtbb-dev libtiff-dev
     # scree-view: the window, headless OpenGL with Mesa's software driver, pictures out
     libegl-dev libegl-mesa0 libepoxy-dev libgl1-mesa-dri libglfw3-dev libglm-dev libimgui-dev libpng-dev
     # tests; a virtual display for those of the window

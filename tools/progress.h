@@ -19,6 +19,7 @@ public:
     void set_total(double total) { total_ = total; }
     /// `done` of the total; cheap enough to call once a row.
     void update(double done);
+    void add(double more) { update(done_ + more); }
     void finish();
 
 private:

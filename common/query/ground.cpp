@@ -20,7 +20,7 @@ HeightTileView view_of(const HeightTile& tile) { return {&tile.header, tile.samp
 }  // namespace
 
 Ground::Ground(const TileStore& store, std::unique_ptr<TileReader> reader)
-    : store_(store), reader_(std::move(reader)) {}
+    : store_(store), reader_(std::move(reader)), leaf_level_(store.dataset().lattice.deepest_level) {}
 
 Result<std::unique_ptr<Ground>> Ground::open(const TileStore& store) {
     auto reader = store.open_reader();
@@ -59,18 +59,22 @@ Result<std::optional<HeightTileView>> Ground::view(TileId id) {
 
 Result<std::optional<HeightAt>> Ground::height(double x_m, double y_m) {
     return best_height(dataset().lattice, x_m, y_m, [this](std::int64_t ci, std::int64_t cj, double i, double j) {
-        return deepest_height(ci, cj, i, j);
+        return leaf_height(ci, cj, i, j);
     });
 }
 
-Result<std::optional<HeightAt>> Ground::deepest_height(std::int64_t ci, std::int64_t cj, double i, double j) {
+Result<std::optional<HeightAt>> Ground::leaf_height(std::int64_t ci, std::int64_t cj, double i, double j) {
     const Lattice& l = dataset().lattice;
-    const TileId id{l.deepest_level, ci >> l.tile_cells_log2, cj >> l.tile_cells_log2};
+    const TileId deepest{l.deepest_level, ci >> l.tile_cells_log2, cj >> l.tile_cells_log2};
+    const TileId id = ancestor_at(deepest, leaf_level_);
     auto found = tile(id);
     if (!found) return found.error();
-    // From the root it shows whether the tile is absent or lost.
-    if (*found == nullptr) return height_over_cell(*this, ci, cj, i, j);
-    return height_in_cell(dataset(), id, view_of(**found), ci, cj, i, j);
+    if (*found != nullptr && (*found)->header.is_leaf())
+        return height_in_cell(dataset(), id, view_of(**found), ci, cj, i, j);
+    // From the root it shows how deep the leaf lies, and whether a tile is absent or lost.
+    auto height = height_over_cell(*this, ci, cj, i, j);
+    if (height && *height) leaf_level_ = (*height)->level;
+    return height;
 }
 
 }  // namespace scree

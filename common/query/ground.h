@@ -17,7 +17,8 @@ public:
     /// `store` must outlive the object.
     static Result<std::unique_ptr<Ground>> open(const TileStore& store);
 
-    /// As height_at, with a single read where there is ground. Errors: those of the store.
+    /// As height_at, with a single read where there is ground as deep as where it was last asked for. Errors: those of
+    /// the store.
     Result<std::optional<HeightAt>> height(double x_m, double y_m);
     /// As scree::cast_ray.
     Result<std::optional<RayHit>> cast_ray(const Vector3& origin, const Vector3& direction, double max_distance_m) {
@@ -32,7 +33,7 @@ public:
 
 private:
     Ground(const TileStore& store, std::unique_ptr<TileReader> reader);
-    Result<std::optional<HeightAt>> deepest_height(std::int64_t ci, std::int64_t cj, double i, double j);
+    Result<std::optional<HeightAt>> leaf_height(std::int64_t ci, std::int64_t cj, double i, double j);
 
     const TileStore& store_;
     std::unique_ptr<TileReader> reader_;
@@ -41,6 +42,7 @@ private:
         std::optional<HeightTile> tile;
     };
     std::list<Cached> recent_;
+    int leaf_level_;  ///< of the last leaf that answered
 };
 
 }  // namespace scree

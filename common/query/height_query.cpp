@@ -37,14 +37,15 @@ std::optional<HeightAt> height_in_cell(const Dataset& d, TileId id, const Height
                                        std::int64_t cj, double i, double j) {
     const Lattice& l = d.lattice;
     const LatticePoint corner = l.corner(id);
-    if (id.level == l.deepest_level && !tile.presence.empty() &&
-        tile.presence[static_cast<std::size_t>((cj - corner.j) * l.tile_cells() + ci - corner.i)] == 0)
+    const std::int64_t cell = l.step(id.level);
+    if (!tile.presence.empty() &&
+        tile.presence[static_cast<std::size_t>((cj - corner.j) / cell * l.tile_cells() + (ci - corner.i) / cell)] == 0)
         return std::nullopt;
-    const auto step = static_cast<double>(l.step(id.level));
+    const auto step = static_cast<double>(cell);
     const double n =
         drawn_height_at(tile.samples, l.tile_cells_log2, {0, 0}, (i - static_cast<double>(corner.i)) / step,
                         (j - static_cast<double>(corner.j)) / step);
-    return HeightAt{d.height_m(n), surface_error_m(d, id, *tile.header), id.level};
+    return HeightAt{d.height_m(n), surface_error_m(d, *tile.header), id.level, tile.header->is_leaf()};
 }
 
 Result<std::optional<HeightAt>> height_over_cell(HeightSource& source, std::int64_t ci, std::int64_t cj, double i,
@@ -55,7 +56,7 @@ Result<std::optional<HeightAt>> height_over_cell(HeightSource& source, std::int6
     TileId id = ancestor_at(leaf, 0);
     auto tile = source.view(id);
     if (!tile) return tile.error();
-    while (*tile && id.level < l.deepest_level) {
+    while (*tile && !(*tile)->header->is_leaf() && id.level < l.deepest_level) {
         const TileId next = ancestor_at(leaf, id.level + 1);
         if (((*tile)->header->child_mask >> quadrant_of(next) & 1) == 0) return std::optional<HeightAt>{};
         auto child = source.view(next);
@@ -76,17 +77,22 @@ Result<std::optional<HeightAt>> best_height(const Lattice& l, double x_m, double
     const double i = on_lattice(l.i_of(x_m), x_m, l.origin_x_m, l.spacing_m);
     const double j = on_lattice(l.j_of(y_m), y_m, l.origin_y_m, l.spacing_m);
     const TouchedCells columns = touched_cells(i, l.cells_x), rows = touched_cells(j, l.cells_y);
-    std::optional<HeightAt> best;
+    std::optional<HeightAt> best, leaf;
     std::vector<HeightAt> all;
     for (std::int64_t cj = rows.first; cj <= rows.last; ++cj)
         for (std::int64_t ci = columns.first; ci <= columns.last; ++ci) {
             auto height = ask(ci, cj, i, j);
             if (!height) return height;
             if (!*height) continue;
-            if ((*height)->level == l.deepest_level) return height;
+            if ((*height)->finest) {
+                if ((*height)->level == l.deepest_level) return height;
+                if (!leaf || (*height)->level > leaf->level) leaf = *height;
+                continue;
+            }
             if (!best || (*height)->error_bound_m < best->error_bound_m) best = *height;
             all.push_back(**height);
         }
+    if (leaf) return leaf;
     // Which of the cells are present nobody knows here, and an error holds for its own present cells only.
     for (const HeightAt& h : all)
         best->error_bound_m = std::max(best->error_bound_m, h.error_bound_m + std::abs(h.height_m - best->height_m));

@@ -31,10 +31,10 @@ public:
 /// Metres by which a tile's own surface, drawn whole, may differ from the true heights over present cells: its
 /// certified error, and what rounding to quanta and warping cost before the store. What doubles round away is not
 /// counted.
-inline double surface_error_m(const Dataset& dataset, TileId id, const HeightTileHeader& header) {
+inline double surface_error_m(const Dataset& dataset, const HeightTileHeader& header) {
     const double stored_m = dataset.height_quantum_error_m + dataset.warp_error_m;
-    // The finest surface is the stored one; its error_n[0] is about thinned edges.
-    if (id.level >= dataset.lattice.deepest_level) return stored_m;
+    // A leaf's surface is the finest; its error_n[0] is about thinned edges.
+    if (header.is_leaf()) return stored_m;
     return stored_m + static_cast<double>(header.own.error_n[0]) * dataset.height_quantum_m;
 }
 

@@ -125,7 +125,8 @@ private:
     }
 
     Result<void> walk_tile(TileId id, const HeightTileView& tile, const Square& square, Span span) {
-        if (id.level == lattice_.deepest_level) return walk_cells(surface_of(id, tile), square, span), Result<void>{};
+        if (tile.header->is_leaf() || id.level == lattice_.deepest_level)
+            return walk_cells(surface_of(id, tile), square, span), Result<void>{};
         const HeightTileHeader header = *tile.header;  // the view ends with the first child asked for
         for (const Part& part : quarters(ray_, square, span)) {
             if (auto ok = walk_child(id, header, part); !ok) return ok;
@@ -150,7 +151,7 @@ private:
 
     Surface surface_of(TileId id, const HeightTileView& tile) const {
         return {tile, lattice_.corner(id), lattice_.deepest_level - id.level,
-                surface_error_m(source_.dataset(), id, *tile.header)};
+                surface_error_m(source_.dataset(), *tile.header)};
     }
 
     void walk_cells(const Surface& surface, const Square& square, Span span) {

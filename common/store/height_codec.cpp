@@ -13,7 +13,8 @@
 namespace scree {
 namespace {
 
-constexpr std::uint8_t kHasPresence = 1;
+constexpr std::uint8_t kHasPresence = 1, kTextureEnds = 2;
+constexpr std::uint8_t kUnusedFlags = 0x0C;
 
 Error bad(std::string what) { return {ErrorCode::store, "height tile: " + std::move(what)}; }
 
@@ -114,8 +115,11 @@ std::vector<std::uint8_t> encode_height_tile(const HeightTile& tile, int n, Heig
 
     std::vector<std::uint8_t> payload;
     ByteWriter out(payload);
-    out.u8(tile.header.child_mask);
-    out.u8(tile.presence.empty() ? 0 : kHasPresence);
+    const HeightTileHeader& h = tile.header;
+    assert((h.leaf_mask & ~h.child_mask) == 0 && (h.texture_end_mask & ~h.child_mask) == 0);
+    out.u8(static_cast<std::uint8_t>(h.child_mask | h.leaf_mask << 4));
+    out.u8(static_cast<std::uint8_t>((tile.presence.empty() ? 0 : kHasPresence) | (h.texture_ends ? kTextureEnds : 0) |
+                                     h.texture_end_mask << 4));
     write_bounds(out, tile.header.own, geomip_level_count(n));
     for (int q = 0; q < 4; ++q)
         if ((tile.header.child_mask >> q & 1) != 0)
@@ -167,10 +171,14 @@ Result<void> decode_height_tile(std::span<const std::uint8_t> payload, int n, in
     tile.header = {};
     tile.presence.clear();
     ByteReader in(payload);
-    tile.header.child_mask = in.u8();
-    const std::uint8_t flags = in.u8();
-    if (!in.ok() || tile.header.child_mask > 15 || flags > kHasPresence)
-        return bad(fmt::format("child bits {} or flags {} out of range", tile.header.child_mask, flags));
+    const std::uint8_t children = in.u8(), flags = in.u8();
+    tile.header.child_mask = children & 15;
+    tile.header.leaf_mask = children >> 4;
+    tile.header.texture_ends = (flags & kTextureEnds) != 0;
+    tile.header.texture_end_mask = flags >> 4;
+    const unsigned of_children = unsigned{tile.header.leaf_mask} | tile.header.texture_end_mask;
+    if (!in.ok() || (flags & kUnusedFlags) != 0 || (of_children & ~unsigned{tile.header.child_mask}) != 0)
+        return bad(fmt::format("child bits {} or flags {} out of range", children, flags));
     if (!read_bounds(in, tile.header.own, geomip_level_count(n))) return bad("bounds out of range");
     for (int q = 0; q < 4; ++q)
         if ((tile.header.child_mask >> q & 1) != 0 &&

@@ -8,8 +8,8 @@
 #include <unordered_set>
 
 #include "common/mesh/geometric_error.h"
-#include "common/store/height_codec.h"
 #include "runtime/app/drawn_tile.h"
+#include "runtime/app/leaf_walk.h"
 #include "runtime/view/frustum.h"
 
 namespace scree {
@@ -100,56 +100,34 @@ Result<void> audit_frame(const TileStore& store, TileReader& reader, const Audit
                          ErrorHistogram& errors) {
     const Dataset& d = store.dataset();
     const Lattice& l = d.lattice;
-    const int n = l.tile_cells_log2;
     const std::int64_t m = l.tile_cells();
     const Judge judge(frame);
     DrawnTile drawn(
         l, make_relative_frame(l, d.height_offset_m, d.height_quantum_m, frame.camera.eye, frame.half_curvature));
-    TileRow row;
     for (const DrawItem& item : frame.draws) {
         drawn.set(item, frame.arena.vertices(item.height_slot));
         const LatticePoint corner = l.corner(item.tile);
-        const int up = l.deepest_level - item.tile.level;
-        for (std::int64_t y = item.tile.y << up; y < (item.tile.y + 1) << up; ++y)
-            for (std::int64_t x = item.tile.x << up; x < (item.tile.x + 1) << up; ++x) {
-                const TileId id{l.deepest_level, x, y};
-                if (x * m >= l.cells_x || y * m >= l.cells_y) continue;
-                auto found = reader.read(TileKind::height, id, row);
-                if (!found) return found.error();
-                if (!*found) continue;
-                auto tile = decode_height_tile(row.payload, n, row.codec);
-                if (!tile) return tile.error();
-                const auto present = present_vertices(tile->presence, n);
-                for (std::int64_t r = 0; r <= m; ++r)
-                    for (std::int64_t c = 0; c <= m; ++c) {
-                        const auto k = static_cast<std::size_t>(r * (m + 1) + c);
-                        if (!present.empty() && present[k] == 0) continue;
-                        const std::int64_t i = x * m + c, j = y * m + r;
-                        const glm::dvec3 truth{l.x_m(static_cast<double>(i)), l.y_m(static_cast<double>(j)),
-                                               d.height_m(tile->samples[k])};
-                        judge.add(truth, drawn, static_cast<double>(i - corner.i), static_cast<double>(j - corner.j),
-                                  errors);
-                    }
-            }
+        auto ok = for_each_leaf(reader, l, item.tile, [&](TileId id, const HeightTile& leaf) {
+            const auto present = present_vertices(leaf.presence, l.tile_cells_log2);
+            const LatticePoint first = l.corner(id);
+            const std::int64_t step = l.step(id.level);
+            for (std::int64_t r = 0; r <= m; ++r)
+                for (std::int64_t c = 0; c <= m; ++c) {
+                    const auto k = static_cast<std::size_t>(r * (m + 1) + c);
+                    if (!present.empty() && present[k] == 0) continue;
+                    const std::int64_t i = first.i + c * step, j = first.j + r * step;
+                    const glm::dvec3 truth{l.x_m(static_cast<double>(i)), l.y_m(static_cast<double>(j)),
+                                           d.height_m(leaf.samples[k])};
+                    judge.add(truth, drawn, static_cast<double>(i - corner.i), static_cast<double>(j - corner.j),
+                              errors);
+                }
+        });
+        if (!ok) return ok;
     }
     return {};
 }
 
 namespace {
-
-/// Columns of a source: with so much room for rounding a sample lies on a line of the lattice.
-constexpr double kOnLine = 1e-6;
-
-// Does the sample belong to a cell of four valid ones? Where it does not, nothing is drawn.
-bool is_drawn(const SourceRaster& source, std::int64_t column, std::int64_t row) {
-    const auto valid = [&](std::int64_t c, std::int64_t r) {
-        return c >= 0 && r >= 0 && c < source.columns && r < source.rows && !std::isnan(source.at(c, r));
-    };
-    for (const int dx : {-1, 1})
-        for (const int dy : {-1, 1})
-            if (valid(column + dx, row) && valid(column, row + dy) && valid(column + dx, row + dy)) return true;
-    return false;
-}
 
 // Which drawn tile a place belongs to: on a line between tiles to one of them, whichever are drawn.
 class TileMap {
@@ -157,9 +135,9 @@ public:
     TileMap(const Lattice& lattice, const DrawList& draws) : lattice_(lattice) {
         for (const DrawItem& item : draws) drawn_.insert(item.tile);
     }
-    bool owns(TileId tile, double i, double j, double slack_i, double slack_j) const {
-        for (const std::int64_t cj : cells_at(j, slack_j))
-            for (const std::int64_t ci : cells_at(i, slack_i))
+    bool owns(TileId tile, double i, double j, double slack) const {
+        for (const std::int64_t cj : cells_at(j, slack))
+            for (const std::int64_t ci : cells_at(i, slack))
                 if (const auto found = over(ci, cj)) return *found == tile;
         return false;
     }
@@ -181,52 +159,42 @@ private:
     std::unordered_set<TileId, TileIdHash> drawn_;
 };
 
-/// Samples of a source along one axis: first and one past the last of those between two places, both included, given
-/// in columns.
-struct Range {
-    std::int64_t first, end;
-    Range(double from, double to, std::int64_t count)
-        : first(static_cast<std::int64_t>(std::clamp(std::ceil(from - kOnLine), 0.0, static_cast<double>(count)))),
-          end(static_cast<std::int64_t>(std::clamp(std::floor(to + kOnLine) + 1, 0.0, static_cast<double>(count)))) {}
-};
-
 }  // namespace
 
-void audit_against(const Dataset& d, const SourceRaster& source, const AuditedFrame& frame, double stated_m,
+void audit_against(const Dataset& d, const SourceJudge& source, const AuditedFrame& frame, double stated_m,
                    ErrorHistogram& errors, double& excess_px) {
     const Lattice& l = d.lattice;
     const Judge judge(frame);
     const TileMap tiles(l, frame.draws);
-    const double slack_i = kOnLine * source.dx / l.spacing_m, slack_j = kOnLine * source.dy / l.spacing_m;
+    const SourceLayer& layer = source.layer();
+    const double slack = source.slack_m() / l.spacing_m;
     DrawnTile drawn(
         l, make_relative_frame(l, d.height_offset_m, d.height_quantum_m, frame.camera.eye, frame.half_curvature));
-    const auto column_at = [&](std::int64_t i) { return (l.x_m(static_cast<double>(i)) - source.x0) / source.dx; };
-    const auto row_at = [&](std::int64_t j) { return (source.y0 - l.y_m(static_cast<double>(j))) / source.dy; };
     for (const DrawItem& item : frame.draws) {
         drawn.set(item, frame.arena.vertices(item.height_slot));
         const LatticePoint corner = l.corner(item.tile);
         const std::int64_t extent = l.tile_extent(item.tile.level);
         const auto last = static_cast<double>(extent);
-        const Range columns(column_at(corner.i), column_at(std::min(corner.i + extent, l.cells_x)), source.columns);
-        const Range rows(row_at(corner.j), row_at(std::min(corner.j + extent, l.cells_y)), source.rows);
-        for (std::int64_t row = rows.first; row < rows.end; ++row)
-            for (std::int64_t column = columns.first; column < columns.end; ++column) {
-                const double height_m = source.at(column, row);
-                if (std::isnan(height_m) || !is_drawn(source, column, row)) continue;
-                const glm::dvec3 truth{source.x0 + static_cast<double>(column) * source.dx,
-                                       source.y0 - static_cast<double>(row) * source.dy, height_m};
-                const double i = l.i_of(truth.x), j = l.j_of(truth.y);
-                // Only a tile's last lines may be another's.
-                if ((row + 1 == rows.end || column + 1 == columns.end) &&
-                    !tiles.owns(item.tile, i, j, slack_i, slack_j))
-                    continue;
-                const double u = std::clamp(i - static_cast<double>(corner.i), 0.0, last);
-                const double v = std::clamp(j - static_cast<double>(corner.j), 0.0, last);
-                const auto px = judge.error_px(truth, drawn, u, v);
-                if (!px) continue;
-                errors.add(*px);
-                excess_px = std::max(excess_px, *px - stated_m * judge.px_per_m(truth));
-            }
+        const double west = static_cast<double>(corner.i), north = static_cast<double>(corner.j);
+        const PlaneRect where{l.x_m(west), l.y_m(static_cast<double>(std::min(corner.j + extent, l.cells_y))),
+                              l.x_m(static_cast<double>(std::min(corner.i + extent, l.cells_x))), l.y_m(north)};
+        source.index().find(where, source.slack_m(), [&](const SampleRect& samples, bool inside) {
+            for (std::int64_t row = samples.row; row < samples.row + samples.rows; ++row)
+                for (std::int64_t column = samples.column; column < samples.column + samples.columns; ++column) {
+                    if (!source.judged(column, row)) continue;
+                    const double height_m = layer.at(column, row);
+                    if (std::isnan(height_m)) continue;
+                    const SourcePoint at = layer.position(static_cast<double>(column), static_cast<double>(row));
+                    const double i = l.i_of(at.x), j = l.j_of(at.y);
+                    if (!inside && !tiles.owns(item.tile, i, j, slack)) continue;
+                    const glm::dvec3 truth{at.x, at.y, height_m};
+                    const auto px =
+                        judge.error_px(truth, drawn, std::clamp(i - west, 0.0, last), std::clamp(j - north, 0.0, last));
+                    if (!px) continue;
+                    errors.add(*px);
+                    excess_px = std::max(excess_px, *px - stated_m * judge.px_per_m(truth));
+                }
+        });
     }
 }
 

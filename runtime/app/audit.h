@@ -10,7 +10,7 @@
 #include "common/store/tile_store.h"
 #include "runtime/app/cpu_arena.h"
 #include "runtime/app/drawn_mesh.h"
-#include "runtime/app/source_samples.h"
+#include "runtime/app/source_judge.h"
 #include "runtime/lod/draw_list.h"
 #include "runtime/view/camera.h"
 
@@ -44,10 +44,9 @@ struct AuditedFrame {
 /// Adds the errors of one drawn frame against the store's finest tiles. Errors: those of the store.
 Result<void> audit_frame(const TileStore& store, TileReader& reader, const AuditedFrame& frame, ErrorHistogram& errors);
 
-/// Adds the errors of one drawn frame against the samples of a source, in the dataset's CRS. `stated_m`: what the store
-/// states of its own heights (warp, quantum); the greatest error beyond what that is seen as goes to `excess_px`.
-/// Samples that belong to no cell of four valid ones are not drawn and not judged.
-void audit_against(const Dataset& dataset, const SourceRaster& source, const AuditedFrame& frame, double stated_m,
+/// Adds the errors of one drawn frame against the judged samples of a source that are in view. `stated_m`: what the
+/// store states of its own heights (warp, quantum); the greatest error beyond what that is seen as goes to `excess_px`.
+void audit_against(const Dataset& dataset, const SourceJudge& source, const AuditedFrame& frame, double stated_m,
                    ErrorHistogram& errors, double& excess_px);
 
 }  // namespace scree

@@ -34,6 +34,7 @@ struct AuditResult {
     int frames = 0;
     ErrorHistogram source_errors;
     double source_excess_px = 0;
+    std::int64_t samples_not_drawn = 0;
 };
 
 struct Audit {
@@ -44,7 +45,7 @@ struct Audit {
     CpuArena& arena;
     TileReader& reader;
     const TilePatterns& patterns;
-    const SourceSamples* sources;
+    std::vector<SourceJudge> sources;
     AuditResult result;
 
     // What is drawn from one pose: settled, or as a flight would have it by now.
@@ -67,14 +68,13 @@ struct Audit {
         result.kept = result.kept && errors.max() <= promised_px;
         result.worst_share = std::max(result.worst_share, errors.max() / promised_px);
         result.errors.merge(errors);
-        if (sources != nullptr)
-            for (const SourceRaster& source : sources->rasters()) {
-                double excess_px = 0;
-                audit_against(d, source, audited, d.warp_error_m + d.height_quantum_error_m, result.source_errors,
-                              excess_px);
-                result.kept = result.kept && excess_px <= promised_px;
-                result.source_excess_px = std::max(result.source_excess_px, excess_px);
-            }
+        for (const SourceJudge& source : sources) {
+            double excess_px = 0;
+            audit_against(d, source, audited, d.warp_error_m + d.height_quantum_error_m, result.source_errors,
+                          excess_px);
+            result.kept = result.kept && excess_px <= promised_px;
+            result.source_excess_px = std::max(result.source_excess_px, excess_px);
+        }
         const CrackReport cracks = count_cracks(d, draws, drawn_mesh(d, patterns, draws, arena));
         result.cracks.edges += cracks.edges;
         result.cracks.open_edges += cracks.open_edges;
@@ -94,7 +94,9 @@ Result<AuditResult> audit(const ViewOptions& o, const AuditOptions& a) {
     const Dataset& d = (*store)->dataset();
     std::optional<SourceSamples> sources;
     if (!a.against.empty()) {
-        auto samples = sample_sources(a.against, a.sampling);
+        SamplingOptions sampling = a.sampling;
+        sampling.crs = d.crs;
+        auto samples = sample_sources(a.against, sampling);
         if (!samples) return samples.error();
         sources = std::move(*samples);
     }
@@ -109,7 +111,14 @@ Result<AuditResult> audit(const ViewOptions& o, const AuditOptions& a) {
     auto reader = (*store)->open_reader();
     if (!reader) return reader.error();
     const TilePatterns patterns(d.lattice.tile_cells_log2);
-    Audit audit{o, a, **store, **scene, arena, **reader, patterns, sources ? &*sources : nullptr, {}};
+    Audit audit{o, a, **store, **scene, arena, **reader, patterns, {}, {}};
+    if (sources)
+        for (const SourceLayer& layer : sources->layers()) {
+            auto judge = SourceJudge::make(d, **reader, layer);
+            if (!judge) return judge.error();
+            audit.result.samples_not_drawn += judge->not_drawn();
+            audit.sources.push_back(std::move(*judge));
+        }
     for (const FlightPose& pose : *path) {
         if (interrupt_flag()) return Error{ErrorCode::interrupted, "stopped"};
         auto camera = camera_of(pose, o);
@@ -117,7 +126,8 @@ Result<AuditResult> audit(const ViewOptions& o, const AuditOptions& a) {
         if (auto ok = audit.look(*camera); !ok) return ok.error();
     }
     AuditResult& r = audit.result;
-    r.kept = r.kept && r.cracks.open_edges == 0 && r.cracks.t_junctions == 0 && r.holes == 0;
+    r.kept =
+        r.kept && r.cracks.open_edges == 0 && r.cracks.t_junctions == 0 && r.holes == 0 && r.samples_not_drawn == 0;
     return std::move(r);
 }
 
@@ -139,6 +149,7 @@ nlohmann::ordered_json report_of(const AuditResult& r, const ViewOptions& o, con
     if (!a.against.empty())
         report["against"] = {{"sources", a.against.size()},
                              {"samples", r.source_errors.count()},
+                             {"samples_not_drawn", r.samples_not_drawn},
                              {"max_error_px", r.source_errors.max()},
                              {"p99_error_px", r.source_errors.quantile(0.99)},
                              {"mean_error_px", r.source_errors.mean()},
@@ -153,9 +164,9 @@ void print(const AuditResult& r, const ViewOptions& o, const AuditOptions& a) {
     if (!a.against.empty())
         fmt::print(
             "against the sources, {} samples: error max {:.4f} px, p99 {:.4f}, mean {:.5f}; {:.4f} px beyond what the "
-            "store states of its heights\n",
+            "store states of its heights; {} samples over no terrain\n",
             r.source_errors.count(), r.source_errors.max(), r.source_errors.quantile(0.99), r.source_errors.mean(),
-            r.source_excess_px);
+            r.source_excess_px, r.samples_not_drawn);
     fmt::print("{} open edges, {} T-junctions, {} holes{}: {}\n", r.cracks.open_edges, r.cracks.t_junctions, r.holes,
                r.limited > 0 ? fmt::format(" ({} frames limited by the budget)", r.limited) : "",
                r.kept ? "the promise holds" : "THE PROMISE IS BROKEN");
@@ -178,6 +189,8 @@ int run_audit(int argc, char** argv) {
         "the bound it states");
     auto* against = app.add_option("--against", a.against,
                                    "Also judge by the DEMs themselves, read by `scree samples`: every sample in view");
+    app.add_option("--assume-crs", a.sampling.assume_crs, "As for scree build")->needs(against);
+    app.add_flag("--assume-same-datum", a.sampling.assume_same_datum, "As for scree build")->needs(against);
     app.add_option("--spacing", a.sampling.spacing_m, "As for scree build, of sources without georeference")
         ->needs(against);
     app.add_option("--height-scale", a.sampling.height_scale, "As for scree build")->needs(against);

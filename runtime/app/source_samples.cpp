@@ -8,6 +8,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <bit>
 #include <cassert>
 #include <cerrno>
@@ -28,11 +29,12 @@ namespace scree {
 namespace {
 
 constexpr char kMagic[] = {'S', 'C', 'R', 'E', 'E', 'S', 'M', 'P'};
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 constexpr std::uint32_t kMaxNameBytes = 4096;
+constexpr std::uint32_t kMaxNames = 1 << 20;
 constexpr std::uint64_t kMaxSide = (std::uint64_t{1} << 30) + 1;  // samples along a side of the largest lattice
-constexpr double kFarthestM = 1e9, kMinSpacingM = 1e-6, kMaxSpacingM = 1e6;  // those of a lattice
-constexpr auto kPatience = std::chrono::milliseconds(5);                     // between looks at the child
+constexpr double kFarthestM = 1e9;                                // of a lattice
+constexpr auto kPatience = std::chrono::milliseconds(5);          // between looks at the child
 
 class Descriptor {
 public:
@@ -52,43 +54,87 @@ Error system_error(const std::string& what) {
     return {ErrorCode::io, fmt::format("{}: {}", what, std::strerror(errno))};
 }
 
-// Reads one source's fields; `file` is the whole file, and `in` stands within it.
-Result<SourceRaster> read_raster(ByteReader& in, std::span<const std::uint8_t> file, const std::string& where) {
-    const auto bad = [&](const std::string& what) { return Error{ErrorCode::input, where + ": " + what}; };
-    const std::uint32_t name_bytes = in.u32();
-    if (in.ok() && name_bytes > kMaxNameBytes)
-        return bad(fmt::format("a name of {} bytes; at most {} are sound", name_bytes, kMaxNameBytes));
-    const auto name = in.bytes(name_bytes);
-    SourceRaster r;
-    r.name.assign(name.begin(), name.end());
-    for (double* v : {&r.x0, &r.y0, &r.dx, &r.dy}) *v = in.f64();
-    const std::uint64_t columns = in.u64(), rows = in.u64();
-    const std::uint32_t sample_bytes = in.u32();
-    const std::uint64_t offset = in.u64();
-    if (!in.ok()) return bad("the header is cut off");
-    if (!(std::abs(r.x0) <= kFarthestM && std::abs(r.y0) <= kFarthestM))
-        return bad(fmt::format("first sample at ({}, {}) m is no place within {} m", r.x0, r.y0, kFarthestM));
-    for (const double spacing : {r.dx, r.dy})
-        if (!(spacing >= kMinSpacingM && spacing <= kMaxSpacingM))
-            return bad(fmt::format("spacing {} m is outside {}..{} m", spacing, kMinSpacingM, kMaxSpacingM));
-    if (columns < 1 || rows < 1 || columns > kMaxSide || rows > kMaxSide)
-        return bad(fmt::format("{} x {} samples; a side has 1 to {}", columns, rows, kMaxSide));
-    if (sample_bytes != 4 && sample_bytes != 8)
-        return bad(fmt::format("samples of {} bytes; 4 and 8 are known", sample_bytes));
-    // At most (2^30 + 1)^2 * 8 < 2^64.
-    const std::uint64_t bytes = columns * rows * sample_bytes, size = file.size();
-    if (offset % 8 != 0) return bad(fmt::format("samples at byte {}, which is no multiple of 8", offset));
-    if (offset < size - in.remaining() || offset > size || bytes > size - offset)
-        return bad(
-            fmt::format("samples at byte {}, {} bytes, do not lie within the file's {} bytes", offset, bytes, size));
-    r.columns = static_cast<std::int64_t>(columns);
-    r.rows = static_cast<std::int64_t>(rows);
-    r.sample_bytes = sample_bytes;
-    r.samples = std::as_bytes(file.subspan(offset, bytes));
-    return r;
-}
+// Reads one layer's fields; `file` is the whole file, and `in` stands within it.
+class LayerReader {
+public:
+    LayerReader(ByteReader& in, std::span<const std::uint8_t> file, std::string where)
+        : in_(in), file_(file), where_(std::move(where)) {}
 
-Result<std::vector<SourceRaster>> read_header(std::span<const std::uint8_t> file, const std::string& name) {
+    Result<SourceLayer> read() {
+        SourceLayer l;
+        if (auto ok = read_names(l); !ok) return ok.error();
+        const std::uint64_t columns = in_.u64(), rows = in_.u64(), step = in_.u64();
+        const std::uint32_t sample_bytes = in_.u32();
+        const std::uint64_t control_offset = in_.u64(), offset = in_.u64();
+        if (!in_.ok()) return bad("the header is cut off");
+        if (columns < 2 || rows < 2 || columns > kMaxSide || rows > kMaxSide)
+            return bad(fmt::format("{} x {} samples; a side has 2 to {}", columns, rows, kMaxSide));
+        if (step < 1 || step > 2 * kMaxSide)
+            return bad(fmt::format("control points every {} samples; 1 to {} are sound", step, 2 * kMaxSide));
+        if (sample_bytes != 4 && sample_bytes != 8)
+            return bad(fmt::format("samples of {} bytes; 4 and 8 are known", sample_bytes));
+        l.columns = static_cast<std::int64_t>(columns);
+        l.rows = static_cast<std::int64_t>(rows);
+        l.step = static_cast<std::int64_t>(step);
+        l.sample_bytes = sample_bytes;
+        // At most (2^30 + 1)^2 of either: no overflow in the counts.
+        const auto points =
+            static_cast<std::uint64_t>(l.control_columns()) * static_cast<std::uint64_t>(l.control_rows());
+        auto controls = part(control_offset, points, 16, "control points");
+        if (!controls) return controls.error();
+        auto samples = part(offset, columns * rows, sample_bytes, "samples");
+        if (!samples) return samples.error();
+        l.controls = *controls;
+        l.samples = *samples;
+        if (auto ok = check_controls(l); !ok) return ok.error();
+        return l;
+    }
+
+private:
+    Error bad(const std::string& what) const { return {ErrorCode::input, where_ + ": " + what}; }
+
+    Result<void> read_names(SourceLayer& l) {
+        const std::uint32_t count = in_.u32();
+        if (in_.ok() && (count == 0 || count > kMaxNames))
+            return bad(fmt::format("a layer of {} files; 1 to {} are sound", count, kMaxNames));
+        for (std::uint32_t k = 0; k < count && in_.ok(); ++k) {  // ends at the file's end, however large the count
+            const std::uint32_t bytes = in_.u32();
+            if (in_.ok() && bytes > kMaxNameBytes)
+                return bad(fmt::format("a name of {} bytes; at most {} are sound", bytes, kMaxNameBytes));
+            const auto name = in_.bytes(bytes);
+            l.names.emplace_back(name.begin(), name.end());
+        }
+        return in_.ok() ? Result<void>() : bad("the header is cut off");
+    }
+
+    Result<std::span<const std::byte>> part(std::uint64_t offset, std::uint64_t count, std::uint64_t bytes_each,
+                                            const char* what) const {
+        const std::uint64_t size = file_.size();
+        if (offset % 8 != 0) return bad(fmt::format("{} at byte {}, which is no multiple of 8", what, offset));
+        if (offset < size - in_.remaining() || offset > size || count > (size - offset) / bytes_each)
+            return bad(fmt::format("{} {} of {} bytes at byte {} do not lie within the file's {} bytes", count, what,
+                                   bytes_each, offset, size));
+        return std::as_bytes(file_.subspan(offset, count * bytes_each));
+    }
+
+    Result<void> check_controls(const SourceLayer& l) const {
+        for (std::int64_t r = 0; r < l.control_rows(); ++r)
+            for (std::int64_t c = 0; c < l.control_columns(); ++c) {
+                const SourcePoint p = l.control(c, r);
+                if (std::isnan(p.x) && std::isnan(p.y)) continue;
+                if (!(std::abs(p.x) <= kFarthestM && std::abs(p.y) <= kFarthestM))
+                    return bad(fmt::format("control point {}, {} at ({}, {}) m is no place within {} m", c, r, p.x, p.y,
+                                           kFarthestM));
+            }
+        return {};
+    }
+
+    ByteReader& in_;
+    std::span<const std::uint8_t> file_;
+    std::string where_;
+};
+
+Result<std::vector<SourceLayer>> read_header(std::span<const std::uint8_t> file, const std::string& name) {
     ByteReader in(file);
     const auto magic = in.bytes(sizeof kMagic);
     const std::uint32_t version = in.u32(), count = in.u32();
@@ -97,14 +143,14 @@ Result<std::vector<SourceRaster>> read_header(std::span<const std::uint8_t> file
     if (version != kVersion)
         return Error{ErrorCode::input,
                      fmt::format("{}: samples of version {}; this program reads version {}", name, version, kVersion)};
-    if (count == 0) return Error{ErrorCode::input, fmt::format("{}: no source in it", name)};
-    std::vector<SourceRaster> rasters;
+    if (count == 0) return Error{ErrorCode::input, fmt::format("{}: no layer in it", name)};
+    std::vector<SourceLayer> layers;
     for (std::uint32_t k = 0; k < count; ++k) {  // ends at the file's end, however large the count
-        auto raster = read_raster(in, file, fmt::format("{}: source {} of {}", name, k + 1, count));
-        if (!raster) return raster.error();
-        rasters.push_back(std::move(*raster));
+        auto layer = LayerReader(in, file, fmt::format("{}: layer {} of {}", name, k + 1, count)).read();
+        if (!layer) return layer.error();
+        layers.push_back(std::move(*layer));
     }
-    return rasters;
+    return layers;
 }
 
 std::string program_beside_this_one() {
@@ -129,8 +175,11 @@ Result<int> unnamed_file() {
 std::vector<std::string> arguments_of(const std::vector<std::string>& sources, const SamplingOptions& o, int fd) {
     // With an equals sign: a value may begin with a minus. Formatted doubles read back as the same doubles.
     std::vector<std::string> words{"scree", "samples", "--quiet", fmt::format("--fd={}", fd)};
+    if (!o.crs.empty()) words.push_back("--crs=" + o.crs);
+    if (o.assume_crs) words.push_back("--assume-crs=" + *o.assume_crs);
+    if (o.assume_same_datum) words.push_back("--assume-same-datum");
     if (o.spacing_m) words.push_back(fmt::format("--spacing={}", *o.spacing_m));
-    words.push_back(fmt::format("--height-scale={}", o.height_scale));
+    if (o.height_scale) words.push_back(fmt::format("--height-scale={}", *o.height_scale));
     words.push_back(fmt::format("--height-offset={}", o.height_offset_m));
     if (o.nodata) words.push_back(fmt::format("--nodata={}", *o.nodata));
     words.push_back("--");
@@ -186,7 +235,7 @@ Result<void> check_end(int status, const std::string& program) {
 
 }  // namespace
 
-double SourceRaster::at(std::int64_t column, std::int64_t row) const {
+double SourceLayer::stored(std::int64_t column, std::int64_t row) const {
     static_assert(std::endian::native == std::endian::little && std::numeric_limits<float>::is_iec559);
     assert(column >= 0 && column < columns && row >= 0 && row < rows);
     const std::byte* from = samples.data() + static_cast<std::size_t>(row * columns + column) * sample_bytes;
@@ -198,7 +247,36 @@ double SourceRaster::at(std::int64_t column, std::int64_t row) const {
         std::memcpy(&narrow, from, 4);
         height = narrow;
     }
+    return height;
+}
+
+double SourceLayer::at(std::int64_t column, std::int64_t row) const {
+    const double height = stored(column, row);
     return std::isfinite(height) ? height : std::numeric_limits<double>::quiet_NaN();
+}
+
+bool SourceLayer::covered(std::int64_t column, std::int64_t row) const { return !std::isnan(stored(column, row)); }
+
+SourcePoint SourceLayer::control(std::int64_t control_column, std::int64_t control_row) const {
+    const std::int64_t k = control_row * control_columns() + control_column;
+    SourcePoint p;
+    std::memcpy(&p.x, controls.data() + k * 16, 8);
+    std::memcpy(&p.y, controls.data() + k * 16 + 8, 8);
+    return p;
+}
+
+SourcePoint SourceLayer::position(double column, double row) const {
+    const auto cell_of = [this](double at, std::int64_t points) {
+        return std::clamp<std::int64_t>(static_cast<std::int64_t>(at / static_cast<double>(step)), 0, points - 2);
+    };
+    const std::int64_t cc = cell_of(column, control_columns()), cr = cell_of(row, control_rows());
+    const auto left = static_cast<double>(control_column(cc)), right = static_cast<double>(control_column(cc + 1));
+    const auto top = static_cast<double>(control_row(cr)), bottom = static_cast<double>(control_row(cr + 1));
+    const double s = (column - left) / (right - left), t = (row - top) / (bottom - top);
+    const auto mix = [](const SourcePoint& a, const SourcePoint& b, double share) {
+        return SourcePoint{(1 - share) * a.x + share * b.x, (1 - share) * a.y + share * b.y};
+    };
+    return mix(mix(control(cc, cr), control(cc + 1, cr), s), mix(control(cc, cr + 1), control(cc + 1, cr + 1), s), t);
 }
 
 Result<SourceSamples> SourceSamples::open(const std::string& path) {
@@ -218,9 +296,9 @@ Result<SourceSamples> SourceSamples::map(int descriptor, const std::string& name
     SourceSamples samples;
     samples.mapping_ = {static_cast<const std::byte*>(start),
                         [start, size](const std::byte*) { ::munmap(start, size); }};
-    auto rasters = read_header({static_cast<const std::uint8_t*>(start), size}, name);
-    if (!rasters) return rasters.error();
-    samples.rasters_ = std::move(*rasters);
+    auto layers = read_header({static_cast<const std::uint8_t*>(start), size}, name);
+    if (!layers) return layers.error();
+    samples.layers_ = std::move(*layers);
     return samples;
 }
 

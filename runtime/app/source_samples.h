@@ -15,17 +15,38 @@
 
 namespace scree {
 
-/// One DEM. Sample (column, row) stands at x = x0 + column * dx, y = y0 - row * dy, in metres of its CRS.
-struct SourceRaster {
-    std::string name;  ///< of the file, without folders
-    double x0 = 0, y0 = 0, dx = 1, dy = 1;
+/// A place in metres of the dataset's CRS; NaN, both: nowhere in it.
+struct SourcePoint {
+    double x = 0, y = 0;
+};
+
+/// One layer: the samples of files on one grid after they were laid over one another, in any CRS and attitude. Where
+/// samples stand is given at control points, every `step` columns and rows and on the last ones; bilinear between.
+struct SourceLayer {
+    std::vector<std::string> names;  ///< of its files, bottom to top, without folders
     std::int64_t columns = 0, rows = 0;
+    std::int64_t step = 1;
 
-    /// Height in metres; NaN for a void. The sample must exist: 0 <= column < columns, 0 <= row < rows.
+    /// Height in metres; NaN where the sample is no truth: a void, uncovered, or hidden by a layer above. The sample
+    /// must exist: 0 <= column < columns, 0 <= row < rows.
     double at(std::int64_t column, std::int64_t row) const;
+    /// The sample has a height or lies under one: there is terrain.
+    bool covered(std::int64_t column, std::int64_t row) const;
+    SourcePoint position(double column, double row) const;
 
-    std::span<const std::byte> samples;  ///< columns * rows, row-major; lives as long as the SourceSamples
-    std::size_t sample_bytes = 4;        ///< 4: float, 8: double
+    std::int64_t control_columns() const { return (columns - 2) / step + 2; }
+    std::int64_t control_rows() const { return (rows - 2) / step + 2; }
+    /// Sample column of a control column, sample row of a control row.
+    std::int64_t control_column(std::int64_t k) const { return k + 1 < control_columns() ? k * step : columns - 1; }
+    std::int64_t control_row(std::int64_t k) const { return k + 1 < control_rows() ? k * step : rows - 1; }
+    SourcePoint control(std::int64_t control_column, std::int64_t control_row) const;
+
+    std::span<const std::byte> samples;   ///< columns * rows, row-major; lives as long as the SourceSamples
+    std::size_t sample_bytes = 4;         ///< 4: float, 8: double
+    std::span<const std::byte> controls;  ///< x and y, doubles, row-major; lives as long as the SourceSamples
+
+private:
+    double stored(std::int64_t column, std::int64_t row) const;
 };
 
 /// A mapped file of samples: what is looked at costs memory that the system takes back as it likes. Any number of
@@ -38,18 +59,22 @@ public:
     /// The same for an open file, which may be closed afterwards; `name` is for messages.
     static Result<SourceSamples> map(int descriptor, const std::string& name);
 
-    const std::vector<SourceRaster>& rasters() const { return rasters_; }
+    /// Bottom to top.
+    const std::vector<SourceLayer>& layers() const { return layers_; }
 
 private:
     SourceSamples() = default;
     std::shared_ptr<const std::byte> mapping_;
-    std::vector<SourceRaster> rasters_;
+    std::vector<SourceLayer> layers_;
 };
 
 /// How the sources are to be read: as they were for the build.
 struct SamplingOptions {
-    std::optional<double> spacing_m;  ///< for files without georeference
-    double height_scale = 1;          ///< z = value * scale + offset
+    std::string crs;                        ///< the dataset's; empty: metres of the files' own
+    std::optional<std::string> assume_crs;  ///< of files that name none
+    bool assume_same_datum = false;
+    std::optional<double> spacing_m;     ///< for files without georeference
+    std::optional<double> height_scale;  ///< z = value * scale + offset; none: as the files say
     double height_offset_m = 0;
     std::optional<double> nodata;             ///< besides the files' own
     const std::atomic<bool>* stop = nullptr;  ///< ends the child, too, when it becomes true

@@ -105,7 +105,7 @@ void Cut::judge(CutNode& node, double parent_error_m) const {
     node.finest_error_m = finer_m;
     if (finer_m > allowed_m) {
         node.level = level_of(finest);
-        node.wants_geometry = node.id.level < lattice_.deepest_level;
+        node.wants_geometry = !node.leaf;
     } else {
         for (int geomip = 1; geomip < lattice_.tile_cells_log2; ++geomip) {
             const double exact_m = error_m(node, geomip);
@@ -124,10 +124,10 @@ void Cut::judge(CutNode& node, double parent_error_m) const {
 }
 
 void Cut::judge_texture(CutNode& node) const {
-    if (node.id.level >= dataset_.texture_deepest_level) return;
+    if (node.texture_ends || node.id.level >= dataset_.texture_deepest_level) return;
     node.texture_need =
         texel_m_[static_cast<std::size_t>(node.id.level)] / node.texel_per_px / settings_.texture_tau_px;
-    const bool parts = node.id.level == lattice_.deepest_level;
+    const bool parts = node.leaf;
     if (parts && node.texture_need <= 1) return;
     if (!parts && node.texture_need < kNotYetApproaching) return;
     const double doublings = std::min(std::log2(node.texture_need), 64.0);
@@ -145,13 +145,12 @@ void Cut::judge_texture(CutNode& node) const {
 }
 
 // -1: no view sees it, and what is not seen is neither refined nor drawn nor anybody's neighbour.
-std::int32_t Cut::add_node(TileId id, const HeightBounds& bounds, std::int32_t slot, std::int32_t texture_slot,
-                           std::int32_t parent) {
+std::int32_t Cut::add_node(TileId id, const Known& known, std::int32_t parent) {
     const auto every_view = static_cast<std::uint32_t>((std::uint64_t{1} << views_.size()) - 1);
     CutNode& node = nodes_.emplace_back();
     const CutNode* above = parent < 0 ? nullptr : &nodes_[static_cast<std::size_t>(parent)];
     node.id = id;
-    node.bounds = &bounds;
+    node.bounds = known.bounds;
     const LatticePoint corner = lattice_.corner(id);
     node.west_m = lattice_.x_m(static_cast<double>(corner.i));
     node.north_m = lattice_.y_m(static_cast<double>(corner.j));
@@ -161,13 +160,35 @@ std::int32_t Cut::add_node(TileId id, const HeightBounds& bounds, std::int32_t s
         return -1;
     }
     node.page_level = static_cast<std::int8_t>(id.level);
-    node.slot = slot;
-    node.texture_slot = texture_slot;
+    node.slot = known.slot;
+    node.texture_slot = known.texture_slot;
+    node.leaf = known.leaf;
+    node.texture_ends = known.texture_ends;
+    node.textured = known.textured;
     node.parent = parent;
     judge(node, above == nullptr ? kInfinity : above->finest_error_m);
     if (above != nullptr) node.level = std::min(node.level, above->level);
     ++pages_;
     return static_cast<std::int32_t>(nodes_.size()) - 1;
+}
+
+Cut::Known Cut::known_root(std::size_t root) const {
+    const std::int32_t slot = residency_->heights.roots[root];
+    const HeightTileHeader& header = residency_->heights.headers[static_cast<std::size_t>(slot)];
+    const std::int32_t texture = residency_->textures.roots.empty() ? kNotResident : residency_->textures.roots[root];
+    return {&header.own, slot, texture, header.is_leaf(), header.texture_ends, true};
+}
+
+Cut::Known Cut::known_child(const CutNode& parent, std::size_t quadrant) const {
+    const auto slot = static_cast<std::size_t>(parent.slot);
+    const HeightTileHeader& header = residency_->heights.headers[slot];
+    Known child{&header.children[quadrant], residency_->heights.children[slot][quadrant]};
+    child.leaf = parent.page_level + 1 == lattice_.deepest_level || (header.leaf_mask >> quadrant & 1) != 0;
+    child.textured = !parent.texture_ends && parent.page_level < dataset_.texture_deepest_level;
+    child.texture_ends = parent.texture_ends || (header.texture_end_mask >> quadrant & 1) != 0;
+    if (child.textured && parent.texture_slot >= 0)
+        child.texture_slot = residency_->textures.children[static_cast<std::size_t>(parent.texture_slot)][quadrant];
+    return child;
 }
 
 void Cut::add_roots() {
@@ -178,9 +199,7 @@ void Cut::add_roots() {
         if (slots[k] < 0) continue;  // a root without any present cell is not stored
         const TileId id{0, static_cast<std::int64_t>(k) % lattice_.root_columns,
                         static_cast<std::int64_t>(k) / lattice_.root_columns};
-        const HeightTileHeader& header = residency_->heights.headers[static_cast<std::size_t>(slots[k])];
-        const std::int32_t texture = residency_->textures.roots.empty() ? kNotResident : residency_->textures.roots[k];
-        roots_[k] = add_node(id, header.own, slots[k], texture, -1);
+        roots_[k] = add_node(id, known_root(k), -1);
         if (roots_[k] >= 0) --pages_;  // pinned: counted whether in view or not
     }
     for (const std::int32_t root : roots_) {
@@ -265,18 +284,14 @@ bool Cut::try_split(std::int32_t index) {
     if (nodes_.capacity() < nodes_.size() + 4) nodes_.reserve(2 * nodes_.size() + 64);
     const CutNode& parent = nodes_[static_cast<std::size_t>(index)];
     const HeightTileHeader& header = residency_->heights.headers[static_cast<std::size_t>(parent.slot)];
-    if (header.child_mask == 0) return false;
-    const auto& slots = residency_->heights.children[static_cast<std::size_t>(parent.slot)];
+    if (header.is_leaf()) return false;
     const std::size_t first = nodes_.size();
     const std::int64_t pages_before = pages_;
     std::array<std::int32_t, 4> children{-1, -1, -1, -1};
     for (int q = 0; q < 4; ++q) {
         const auto k = static_cast<std::size_t>(q);
         if ((header.child_mask >> q & 1) == 0) continue;
-        const std::int32_t texture =
-            parent.texture_slot < 0 ? kNotResident
-                                    : residency_->textures.children[static_cast<std::size_t>(parent.texture_slot)][k];
-        children[k] = add_node(child_of(parent.id, q), header.children[k], slots[k], texture, index);
+        children[k] = add_node(child_of(parent.id, q), known_child(parent, k), index);
         if (children[k] < 0) continue;
         const CutNode& child = nodes_[static_cast<std::size_t>(children[k])];
         if (child.slot >= 0) continue;
@@ -343,8 +358,7 @@ void Cut::consider_from(std::size_t first) {
     for (std::size_t k = first; k < nodes_.size() && pages_ <= settings_.max_pages; ++k) {
         const CutNode& node = nodes_[k];
         if (!node.visible() || node.split) continue;
-        if (node.wants_geometry || (node.texture_need > 1 && node.id.level < lattice_.deepest_level))
-            try_split(static_cast<std::int32_t>(k));
+        if (node.wants_geometry || (node.texture_need > 1 && !node.leaf)) try_split(static_cast<std::int32_t>(k));
     }
 }
 
@@ -409,13 +423,13 @@ Level Cut::limit_beside(const CutNode& node) const {
 }
 
 // How coarse an edge may be. The finest surface is only inexact where its edges move: they may move no further than its
-// tolerance allows.
+// tolerance allows. (A coarser leaf beside it keeps its stride all the same.)
 Level Cut::edge_limit(const CutNode& node) const {
     const Level limit = node.level + kOneLevel;
-    if (node.page_level < lattice_.deepest_level) return limit;
+    if (!node.leaf) return limit;
     const double allowed_m = settings_.tau_px * node.metres_per_px;
     if (!(allowed_m < node.finest_error_m)) return limit;
-    return std::min(limit, level_of_share(allowed_m / node.finest_error_m));
+    return std::min(limit, level_of(minimum_exponent(node)) + level_of_share(allowed_m / node.finest_error_m));
 }
 
 // A page that a plan would split once it is there holds nobody coarse meanwhile: what a plan holds only
@@ -499,7 +513,7 @@ bool Cut::lower(std::int32_t index, Level limit) {
     const std::size_t first = nodes_.size();
     const bool growing = finest > level_of(minimum_exponent(node));
     if (is_unknown(node)) return changed;
-    if (growing || node.id.level == lattice_.deepest_level || !try_split(index)) {
+    if (growing || node.leaf || !try_split(index)) {
         needs_floors_ = nodes_[static_cast<std::size_t>(index)].refused = true;
         return changed;
     }
@@ -591,7 +605,7 @@ double Cut::drawn_error_m(const CutNode& leaf, const Drawn& drawn) const {
     const double thinned_m = error_m(leaf, geomip);
     const double coarser_m = geomip + 1 < lattice_.tile_cells_log2 ? error_m(leaf, geomip + 1) : thinned_m;
     const double inner = drawn.morph;
-    if (drawn.exponent > 0 || drawn.edge_mask != 0) return (1 - inner) * thinned_m + inner * coarser_m;
+    if (!leaf.leaf || geomip > 0 || drawn.edge_mask != 0) return (1 - inner) * thinned_m + inner * coarser_m;
     // The finest surface is exact but for what has moved; an edge that moves further than the tile is half thinned.
     const double edge =
         std::max(inner, static_cast<double>(*std::max_element(drawn.edge_morph.begin(), drawn.edge_morph.end())));

@@ -52,6 +52,9 @@ struct alignas(64) CutNode {
     bool wants_geometry = false;  ///< its finest mesh is not good enough
     bool queued = false;
     bool refused = false;        ///< neighbours want it finer than it can be
+    bool leaf = false;           ///< of the stored pyramid: nothing finer is there
+    bool texture_ends = false;   ///< no texture below this address is stored
+    bool textured = true;        ///< the texture of this address is stored
     std::int8_t page_level = 0;  ///< id.level
     std::uint32_t seen_by = 0;   ///< views that may see its box; without any it is neither refined nor drawn
     Level level = 0;             ///< drawn; of a split node: what it would be drawn at as a leaf
@@ -137,8 +140,15 @@ private:
     template <class Visit>
     void for_each_neighbour(std::int32_t leaf, int direction, const Visit& visit);
 
-    std::int32_t add_node(TileId id, const HeightBounds& bounds, std::int32_t slot, std::int32_t texture_slot,
-                          std::int32_t parent);
+    /// What a node's parent knows of it.
+    struct Known {
+        const HeightBounds* bounds = nullptr;
+        std::int32_t slot = kNotResident, texture_slot = kNotResident;
+        bool leaf = false, texture_ends = false, textured = true;
+    };
+    Known known_root(std::size_t root) const;
+    Known known_child(const CutNode& parent, std::size_t quadrant) const;
+    std::int32_t add_node(TileId id, const Known& known, std::int32_t parent);
     void measure(CutNode& node, std::uint32_t candidates, std::uint32_t inside) const;
     void judge(CutNode& node, double parent_error_m) const;
     void judge_texture(CutNode& node) const;

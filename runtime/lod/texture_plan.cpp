@@ -64,13 +64,13 @@ std::int64_t TexturePlan::wish(const Cut& cut, std::span<const LodView> views, c
     for (std::size_t k = 0; k < nodes.size(); ++k) {
         const CutNode& node = nodes[k];
         const int level = node.id.level;
-        if (level > dataset_.texture_deepest_level) continue;
+        if (!node.textured) continue;
         const double need = level == 0 ? kInfinity : texel_m(level - 1) / node.texel_per_px / settings_.texture_tau_px;
         if (!(need > 1)) continue;
         needs_[k] = need;
         if (level > 0) ++count;
         mark_wanted(node.texture_slot);
-        if (!node.split && deeper_than_heights() && level == dataset_.lattice.deepest_level)
+        if (node.leaf && !node.split && deeper_than_heights())
             wish_deep(node, {{}, node.texture_slot, node.texture_need});
     }
     return count + static_cast<std::int64_t>(deep_.size());
@@ -207,7 +207,7 @@ void TexturePlan::wish_deep(const CutNode& node, const Part& part) {
 
 void TexturePlan::emit_parts(const Cut& cut, std::int32_t leaf, const DrawItem& item, DrawList& out) const {
     const CutNode& node = cut.nodes()[static_cast<std::size_t>(leaf)];
-    if (node.id.level == dataset_.lattice.deepest_level && item.texture.scale == 1 && item.texture.slot >= 0)
+    if (node.leaf && item.texture.scale == 1 && item.texture.slot >= 0)
         emit_part(node, {{}, item.texture.slot, 0}, item, out);
     else
         out.push_back(item);

@@ -1,6 +1,7 @@
 // TexturePlan: which textures a cut deserves, and which one each of its leaves is drawn with. Textures are a pyramid of
-// their own on the same addresses: a leaf wants the coarsest level whose texel covers no more than the tolerance, and
-// its ancestors, which stand in. Where textures go deeper than heights, a deepest page is drawn in parts.
+// their own on the same addresses, each as deep by place as its data: a leaf of the cut wants the coarsest level whose
+// texel covers no more than the tolerance, and its ancestors, which stand in. Where textures go deeper than heights, a
+// page that is a leaf of the stored pyramid is drawn in parts.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +20,8 @@ class TexturePlan {
 public:
     explicit TexturePlan(const Dataset& dataset);
 
-    bool deeper_than_heights() const { return dataset_.texture_deepest_level > dataset_.lattice.deepest_level; }
+    /// Somewhere, perhaps.
+    bool deeper_than_heights() const { return dataset_.texture_deepest_level > dataset_.least_leaf_level(); }
 
     /// Works out what the leaves of `cut` want; returns how many textures that is, all roots included. The arguments
     /// must outlive the calls below.

@@ -50,6 +50,24 @@ TEST(DatasetJson, ComesBackExactlyAndIsDeterministic) {
     EXPECT_TRUE(back->has_imagery);
 }
 
+TEST(DatasetJson, TheLevelOfTheCoarsestLeafIsSaidWhereDepthVariesOnly) {
+    Dataset d = example();
+    EXPECT_EQ(dataset_to_json(d).find("coarsest_leaf_level"), std::string::npos);
+    EXPECT_EQ(dataset_from_json(dataset_to_json(d))->least_leaf_level(), d.lattice.deepest_level);
+    d.coarsest_leaf_level = 2;
+    const std::string text = dataset_to_json(d);
+    const auto back = dataset_from_json(text);
+    ASSERT_TRUE(back.ok()) << back.error().message;
+    EXPECT_EQ(back->coarsest_leaf_level, 2);
+    EXPECT_EQ(back->least_leaf_level(), 2);
+    EXPECT_EQ(dataset_to_json(*back), text);
+    for (const Json& value : {Json(-1), Json(d.lattice.deepest_level), Json(1e300), Json("2"), Json(nullptr)}) {
+        Json bad = Json::parse(text);
+        bad["coarsest_leaf_level"] = value;
+        EXPECT_FALSE(dataset_from_json(bad.dump()).ok()) << value;
+    }
+}
+
 TEST(DatasetJson, NumbersKeepEveryBit) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());

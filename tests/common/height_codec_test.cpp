@@ -29,6 +29,9 @@ HeightBounds random_bounds(test::Random& random, int n) {
 HeightTile random_tile(test::Random& random, int n, int amplitude) {
     HeightTile tile;
     tile.header.child_mask = static_cast<std::uint8_t>(test::uniform(random, 0, 15));
+    tile.header.leaf_mask = static_cast<std::uint8_t>(test::uniform(random, 0, 15) & tile.header.child_mask);
+    tile.header.texture_ends = test::uniform(random, 0, 1) == 1;
+    tile.header.texture_end_mask = static_cast<std::uint8_t>(test::uniform(random, 0, 15) & tile.header.child_mask);
     tile.header.own = random_bounds(random, n);
     for (std::size_t q = 0; q < 4; ++q)
         if ((tile.header.child_mask >> q & 1) != 0) tile.header.children[q] = random_bounds(random, n);
@@ -53,6 +56,9 @@ HeightTile small_tile() {
     test::Random random(7);
     HeightTile tile = random_tile(random, 2, 1000);
     tile.header.child_mask = 5;
+    tile.header.leaf_mask = 4;
+    tile.header.texture_ends = false;
+    tile.header.texture_end_mask = 1;
     tile.header.children = {};
     tile.header.children[0] = tile.header.children[2] = tile.header.own;
     tile.presence = test::random_presence(random, 2, 50);
@@ -209,10 +215,15 @@ TEST(HeightCodec, HeaderFieldsOutOfRangeAreRefused) {
         ByteWriter(out).i32(v);
         return out;
     };
-    EXPECT_TRUE(refused(0, {16}));  // child bits
-    EXPECT_TRUE(refused(0, {255}));
-    EXPECT_TRUE(refused(1, {2}));  // flags
-    EXPECT_TRUE(refused(1, {128}));
+    EXPECT_EQ(good[0], 0x45);
+    EXPECT_EQ(good[1], 0x11);
+    EXPECT_TRUE(refused(0, {0x25}));  // a leaf among children that do not exist
+    EXPECT_TRUE(refused(0, {0xFF}));  // children whose bounds are not there
+    EXPECT_FALSE(refused(0, {0x55}));
+    EXPECT_TRUE(refused(1, {0x15}));  // flags that mean nothing
+    EXPECT_TRUE(refused(1, {0x19}));
+    EXPECT_TRUE(refused(1, {0x81}));  // textures that end at children that do not exist
+    EXPECT_FALSE(refused(1, {0x53}));
     EXPECT_TRUE(refused(2, int_bytes(-kMaxHeightUnits - 1)));  // minimum
     EXPECT_TRUE(refused(2, int_bytes(kMaxHeightUnits)));       // above the maximum
     EXPECT_TRUE(refused(6, int_bytes(kMaxHeightUnits + 1)));   // maximum

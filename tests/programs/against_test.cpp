@@ -2,6 +2,7 @@
 // the drawn triangles as `shot --mesh` writes them, and arithmetic that shares nothing with either program.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdlib>
@@ -96,20 +97,32 @@ Raster read_samples(const std::string& path) {
         at += sizeof value;
     };
     char magic[8];
-    std::uint32_t version = 0, count = 0, name_bytes = 0, sample_bytes = 0;
-    std::uint64_t columns = 0, rows = 0, offset = 0;
+    std::uint32_t version = 0, count = 0, names = 0, name_bytes = 0, sample_bytes = 0;
+    std::uint64_t columns = 0, rows = 0, step = 0, control_offset = 0, offset = 0;
     take(magic);
     take(version);
     take(count);
+    take(names);
     take(name_bytes);
-    if (std::memcmp(magic, "SCREESMP", 8) != 0 || version != 1 || count != 1) throw std::runtime_error(path);
+    if (std::memcmp(magic, "SCREESMP", 8) != 0 || version != 2 || count != 1 || names != 1)
+        throw std::runtime_error(path);
     at += name_bytes;
-    Raster r;
-    for (double* v : {&r.x0, &r.y0, &r.dx, &r.dy}) take(*v);
-    take(columns);
-    take(rows);
+    for (std::uint64_t* v : {&columns, &rows, &step}) take(*v);
     take(sample_bytes);
+    take(control_offset);
     take(offset);
+    // A raster that lies along x and y has its four corners for control points.
+    Raster r;
+    std::array<std::array<double, 2>, 4> corners{};
+    at = control_offset;
+    for (auto& corner : corners)
+        for (double& v : corner) take(v);
+    r.x0 = corners[0][0];
+    r.y0 = corners[0][1];
+    r.dx = (corners[3][0] - r.x0) / static_cast<double>(columns - 1);
+    r.dy = (r.y0 - corners[3][1]) / static_cast<double>(rows - 1);
+    if (step + 1 < std::max(columns, rows) || corners[1][1] != r.y0 || corners[2][0] != r.x0)
+        throw std::runtime_error(path + ": does not lie along x and y");
     at = offset;
     r.columns = static_cast<std::int64_t>(columns);
     r.rows = static_cast<std::int64_t>(rows);

@@ -3,14 +3,29 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "common/report.h"
 #include "tools/cli/height_options.h"
 #include "tools/pyramid/builder.h"
+#include "tools/source/number_text.h"
 
 namespace scree {
 namespace {
+
+const std::map<std::string, Kernel> kKernels = {
+    {"nearest", Kernel::nearest}, {"bilinear", Kernel::bilinear}, {"cubic", Kernel::cubic}};
+
+Result<FillRule> parse_fill(const std::string& text) {
+    if (text == "smooth") return FillRule{FillRule::Kind::smooth};
+    if (text == "none") return FillRule{FillRule::Kind::none};
+    const auto height = parse_number(text);
+    if (!height || !(std::abs(*height) <= 1e7))
+        return Error{ErrorCode::usage, fmt::format("--fill {} is not smooth, none or a height within 1e7 m", text)};
+    return FillRule{FillRule::Kind::value, *height};
+}
 
 void print_plan(const BuildPlan& plan) {
     const Dataset& d = plan.dataset;
@@ -18,6 +33,10 @@ void print_plan(const BuildPlan& plan) {
     note("lattice: {} x {} cells of {} m, {} levels, {} x {} root{}{}\n", l.cells_x, l.cells_y, l.spacing_m,
          l.deepest_level + 1, l.root_rows, l.root_columns, l.root_rows * l.root_columns == 1 ? "" : "s",
          d.crs.empty() ? "" : ", " + d.crs);
+    const MosaicPlan& m = plan.mosaic;
+    if (!m.crs_reason.empty()) note("CRS: {}\n", m.crs_reason);
+    if (!m.heights_copied) note("heights are resampled: their samples are no square grid of {}\n", d.crs);
+    for (const std::string& warning : m.warnings) note("warning: {}\n", warning);
     note("textures: {} levels, {} m a texel; memory: about {} MiB\n", d.texture_deepest_level + 1,
          d.texel_m(d.texture_deepest_level), plan.memory_bytes >> 20);
 }
@@ -27,14 +46,37 @@ void print_plan(const BuildPlan& plan) {
 int run_build(int argc, char** argv) {
     CLI::App app{"Cuts a DEM and an image into a pyramid of height and DXT1 texture tiles in one file.", "scree build"};
     BuildOptions options;
-    std::string memory = "256M", json, imagery;
-    std::vector<std::string> dems, images;
+    std::string memory = "256M", json;
     bool dry_run = false;
-    app.add_option("DEM", dems, "Heights: GeoTIFF or any image; channel 1")->required()->expected(1, -1);
-    app.add_option("--imagery", images, "Colour image in the same CRS; its extent and resolution may differ")
+    std::vector<double> stretch;
+    std::string fill = "smooth";
+    app.add_option("DEM", options.dems,
+                   "Heights: files and folders; where several have a value the later one lies on top")
+        ->required()
+        ->expected(1, -1);
+    app.add_option("--imagery", options.images, "Colour images: files and folders, in any CRS; later ones lie on top")
         ->expected(1, -1);
     app.add_option("-o,--output", options.out, "The store to write")->required();
     add_height_options(app, options);
+    app.add_option(
+        "--crs", options.crs,
+        "CRS of the store, metric: EPSG:n, WKT or a PROJ string; default: the DEM's own where it is metric, else "
+        "chosen by its place");
+    app.add_option("--assume-crs", options.assume_crs, "CRS of files that name none");
+    app.add_flag("--assume-same-datum", options.assume_same_datum, "Take heights above different datums as they are");
+    app.add_option("--resampling", options.kernel, "Where samples are not lattice points: nearest, bilinear or cubic")
+        ->transform(CLI::CheckedTransformer(kKernels, CLI::ignore_case))
+        ->default_str("bilinear");
+    app.add_option("--fill", fill, "Interior voids of the heights: smooth, none, or a height in metres")
+        ->capture_default_str();
+    app.add_option("--bands", options.colours.bands, "Bands shown as red, green, blue, or as grey: 3,2,1")
+        ->delimiter(',');
+    app.add_option("--stretch", stretch,
+                   "MIN,MAX: values shown black and white; default for 16-bit and float images: percentiles 2 and 98")
+        ->delimiter(',')
+        ->expected(2);
+    app.add_option("--imagery-nodata", options.colours.nodata,
+                   "A pixel value that means nothing, besides the file's own");
     app.add_option("--tile-size", options.tile_size,
                    "Samples along a height tile, 2^n + 1: larger means fewer, coarser choices")
         ->capture_default_str();
@@ -54,11 +96,10 @@ int run_build(int argc, char** argv) {
     } catch (const CLI::ParseError& error) {
         return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorCode::usage);
     }
-    if (dems.size() != 1 || images.size() > 1)
-        return report_error("scree build",
-                            {ErrorCode::usage, "one DEM and at most one image for now; mosaics come later"});
-    options.dem = dems.front();
-    if (!images.empty()) options.imagery = images.front();
+    auto rule = parse_fill(fill);
+    if (!rule) return report_error("scree build", rule.error());
+    options.fill = *rule;
+    if (!stretch.empty()) options.colours.stretch = Stretch{stretch[0], stretch[1]};
     const auto bytes = parse_bytes(memory);
     if (!bytes)
         return report_error("scree build",
@@ -74,15 +115,23 @@ int run_build(int argc, char** argv) {
     if (dry_run) return 0;
     auto report = build_store(std::move(*plan), options, interrupt_flag());
     if (!report) return report_error("scree build", report.error());
+    for (const std::string& warning : report->warnings) note("warning: {}\n", warning);
+    if (!options.quiet)
+        for (const std::string& line : report->notes) note("{}\n", line);
     if (!options.quiet)
         note("{}: {:.1f} MB, {} height tiles, {} texture tiles; {:.1f} s, {:.1f} CPU s, peak {} MiB\n", options.out,
              static_cast<double>(report->store_bytes) / 1e6, report->height_tiles, report->texture_tiles,
              report->seconds, report->cpu_seconds, report->peak_rss_bytes >> 20);
+    if (!options.quiet && report->warp_error_m > 0)
+        note("resampling moved heights by {:.3f} m at most, {:.3f} m root mean square\n", report->warp_error_m,
+             report->warp_rms_m);
     if (json.empty()) return 0;
     const nlohmann::ordered_json out = {{"seconds", report->seconds},
                                         {"cpu_seconds", report->cpu_seconds},
                                         {"peak_rss_bytes", report->peak_rss_bytes},
                                         {"source_megapixels", report->source_megapixels},
+                                        {"warp_error_m", report->warp_error_m},
+                                        {"warp_rms_m", report->warp_rms_m},
                                         {"height_tiles", report->height_tiles},
                                         {"texture_tiles", report->texture_tiles},
                                         {"store_bytes", report->store_bytes}};

@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 #include <filesystem>
+#include <thread>
 
 #include "tools/pyramid/height_pyramid.h"
 #include "tools/pyramid/height_spool.h"
@@ -19,7 +20,13 @@ namespace {
 // Measured on Debian 12: the program and SQLite's cache. Decoders are measured as they run: 13 MiB for libtiff, 120 MiB
 // more for OpenImageIO.
 constexpr std::int64_t kProcessBytes = std::int64_t{20} << 20;
+// Windows of at most 2^18 samples, as stored and as values, with what the kernel makes of them.
+constexpr std::int64_t kSamplingBytesAThread = std::int64_t{6} << 20;
 constexpr double kTexelTolerance = 1.1;  // a texel may be this much coarser than a source pixel
+
+std::int64_t threads_of(const BuildOptions& o) {
+    return o.threads > 0 ? o.threads : std::max(1u, std::thread::hardware_concurrency());
+}
 
 Error input_error(std::string message) { return {ErrorCode::input, std::move(message)}; }
 Error usage_error(std::string message) { return {ErrorCode::usage, std::move(message)}; }
@@ -30,82 +37,81 @@ Result<int> log2_of(int value, int minimum_log2, int maximum_log2, const char* o
     return usage_error(fmt::format("{} is not one of {}", option, allowed));
 }
 
-Result<Lattice> plan_lattice(const BuildOptions& o, const ImageSource& dem, int tile_cells_log2) {
-    const auto place = place_heights(o.dem, dem, o);
-    if (!place) return place.error();
-    return make_lattice(place->x_m, place->y_m, place->step_x_m, dem.info().width - 1, dem.info().height - 1,
-                        tile_cells_log2);
-}
-
-Result<void> plan_imagery(const BuildOptions& o, BuildPlan& plan) {
-    const Lattice& lattice = plan.dataset.lattice;
-    const ImageInfo& info = plan.imagery->info();
-    const auto& dem_where = plan.dem->georeference();
-    const auto& where = plan.imagery->georeference();
-    if (dem_where.has_value() != where.has_value())
-        return input_error(fmt::format("{} {} georeference and {} {}: either both or neither", o.dem,
-                                       dem_where ? "carries a" : "carries no", *o.imagery,
-                                       where ? "does" : "does not"));
-    if (!where) {
-        Georeference covering;  // the image covers the samples' extent edge to edge
-        covering.column_x = static_cast<double>(lattice.cells_x) * lattice.spacing_m / static_cast<double>(info.width);
-        covering.row_y = -static_cast<double>(lattice.cells_y) * lattice.spacing_m / static_cast<double>(info.height);
-        covering.first_x = lattice.origin_x_m + covering.column_x / 2;
-        covering.first_y = lattice.origin_y_m + covering.row_y / 2;
-        plan.imagery_where = covering;
-        return {};
-    }
-    if (auto ok = check_usable(*o.imagery, *where); !ok) return ok;
-    if (!where->crs.empty() && !dem_where->crs.empty() && where->crs != dem_where->crs)
-        return input_error(fmt::format("{} is in {}, {} in {}: both must be in one CRS until warping exists",
-                                       *o.imagery, where->crs, o.dem, dem_where->crs));
-    const double west = where->first_x - where->column_x / 2, north = where->first_y - where->row_y / 2;
-    const double east = west + static_cast<double>(info.width) * where->column_x;
-    const double south = north + static_cast<double>(info.height) * where->row_y;
-    const auto cells_x = static_cast<double>(lattice.cells_x), cells_y = static_cast<double>(lattice.cells_y);
-    if (east <= lattice.x_m(0) || west >= lattice.x_m(cells_x) || north <= lattice.y_m(cells_y) ||
-        south >= lattice.y_m(0))
-        return input_error(fmt::format("{} (x {}..{}, y {}..{}) does not meet {} (x {}..{}, y {}..{})", *o.imagery,
-                                       west, east, south, north, o.dem, lattice.x_m(0), lattice.x_m(cells_x),
-                                       lattice.y_m(cells_y), lattice.y_m(0)));
-    plan.imagery_where = *where;
-    return {};
-}
-
-// The smallest level whose texel is no more than 1.1 source pixels; and never coarser than a texel a cell, because
-// alpha says where heights end.
-int texture_depth(const Dataset& dataset, double source_texel_m) {
-    const double wanted = std::min(kTexelTolerance * source_texel_m, dataset.lattice.spacing_m * (1 + 1e-9));
+// The smallest level whose texel is no more than 1.1 source pixels; and never coarser than a texel a cell of the dense
+// part, because alpha says where heights end.
+int texture_depth(const Dataset& dataset, double cell_m, double source_texel_m) {
+    const double wanted = std::min(kTexelTolerance * source_texel_m, cell_m * (1 + 1e-9));
     int level = 0;
     while (level < kMaxLevel && dataset.texel_m(level) > wanted) ++level;
     return level;
 }
 
+bool north_up(const Georeference& where) { return where.axis_aligned() && where.column_x > 0 && where.row_y < 0; }
+
+// Files that are read straight through, row by row, need no copy.
+void choose_ways(const BuildOptions& o, BuildPlan& plan) {
+    const MosaicPlan& m = plan.mosaic;
+    plan.heights_in_place =
+        m.base_shift == 0 && m.heights.size() == 1 && m.heights_copied && north_up(m.heights.front().where);
+    plan.imagery_in_place = m.imagery.size() == 1 && m.imagery.front().crs.same_as(m.crs) &&
+                            north_up(m.imagery.front().where) && o.kernel == Kernel::bilinear;
+    plan.integer_heights =
+        m.heights_copied && m.same_units &&
+        std::all_of(m.heights.begin(), m.heights.end(), [](const PlacedFile& f) { return is_integer(f.info.type); });
+    plan.wide_heights = !m.same_units || std::any_of(m.heights.begin(), m.heights.end(),
+                                                     [](const PlacedFile& f) { return !fits_float32(f.info.type); });
+}
+
+std::int64_t widest_band_bytes(const std::vector<PlacedFile>& files, std::int64_t bytes_a_sample) {
+    std::int64_t most = 0;
+    for (const PlacedFile& f : files) most = std::max(most, f.info.width * 64 * bytes_a_sample + 2 * f.info.unit_bytes);
+    return most;
+}
+
 void plan_resources(const BuildOptions& o, BuildPlan& plan) {
     const Dataset& d = plan.dataset;
-    const ImageInfo& dem = plan.dem->info();
-    const std::int64_t heights = height_pyramid_bytes(d.lattice) + 2 * dem.unit_bytes + dem.width * 32 * 8;
-    std::int64_t texture = TexturePyramid::bytes_needed(d.lattice, d.texture_size_log2, d.texture_deepest_level);
+    const MosaicPlan& m = plan.mosaic;
+    const Lattice base = m.base_lattice();
+    const std::int64_t width = base.cells_x + 1, rows = base.cells_y + 1;
+    std::int64_t heights = height_pyramid_bytes(base) + width * 32 * 8;
+    if (plan.heights_in_place)
+        heights += 2 * m.heights.front().info.unit_bytes;
+    else
+        heights = std::max(
+            {heights, widest_band_bytes(m.heights, 12), width * 64 * 8 + threads_of(o) * kSamplingBytesAThread});
+    std::int64_t texture = TexturePyramid::bytes_needed(base, d.texture_size_log2, d.texture_deepest_level);
     const std::int64_t texels_wide =
-        d.lattice.cells_x *
-        static_cast<std::int64_t>(std::ceil(d.lattice.spacing_m / d.texel_m(d.texture_deepest_level)));
-    if (plan.imagery) texture += ImageryRows::bytes_needed(plan.imagery->info(), texels_wide);
+        base.cells_x * static_cast<std::int64_t>(std::ceil(base.spacing_m / d.texel_m(d.texture_deepest_level)));
+    if (plan.imagery_in_place)
+        texture += ImageryRows::bytes_needed(m.imagery.front().info, texels_wide);
+    else if (!m.imagery.empty())
+        texture = std::max(texture + texels_wide * 64 * 4 + threads_of(o) * kSamplingBytesAThread,
+                           widest_band_bytes(m.imagery, 8));
     plan.memory_bytes = kProcessBytes + decoder_usage().peak_rss_bytes + std::max(heights, texture);
-    plan.temporary_bytes = HeightSpool::bytes_needed(dem.width, dem.height, !fits_float32(dem.type));
+    plan.temporary_bytes = HeightSpool::bytes_needed(width, rows, plan.wide_heights);
+    if (!plan.heights_in_place) plan.temporary_bytes += height_stack_bytes(m.heights);
+    if (!plan.imagery_in_place) plan.temporary_bytes += image_stack_bytes(m.imagery);
 
     double height_tiles = 0, texture_tiles = 0;
-    for (int level = 0; level <= d.deepest_level(); ++level) {
-        const double extent = std::ldexp(d.lattice.tile_cells(), d.lattice.deepest_level - level);
-        const double tiles = std::ceil(static_cast<double>(d.lattice.cells_x) / extent) *
-                             std::ceil(static_cast<double>(d.lattice.cells_y) / extent);
-        if (level <= d.lattice.deepest_level) height_tiles += tiles;
+    for (int level = 0; level <= std::max(base.deepest_level, d.texture_deepest_level); ++level) {
+        const double extent = std::ldexp(base.tile_cells(), base.deepest_level - level);
+        const double tiles = std::ceil(static_cast<double>(base.cells_x) / extent) *
+                             std::ceil(static_cast<double>(base.cells_y) / extent);
+        if (level <= base.deepest_level) height_tiles += tiles;
         if (level <= d.texture_deepest_level) texture_tiles += tiles;
     }
-    const double samples = d.lattice.tile_samples() * d.lattice.tile_samples();
+    for (std::size_t k = 0; k < m.height_layers.size(); ++k) {
+        if (m.layer_level[k] <= base.deepest_level) continue;
+        // With parents and what grading adds.
+        for (const LayerMember& member : m.height_layers[k].members)
+            height_tiles += 2 + 2 * static_cast<double>(m.heights[member.file].info.width) *
+                                    static_cast<double>(m.heights[member.file].info.height) /
+                                    std::ldexp(1.0, 2 * base.tile_cells_log2);
+    }
+    const double samples = base.tile_samples() * base.tile_samples();
     plan.store_bytes_estimate =
         static_cast<std::int64_t>(height_tiles * (samples * 2 + 200) +
                                   texture_tiles * static_cast<double>(bc1_chain_bytes(d.texture_size_log2)) * 1.02);
-    (void)o;
 }
 
 SourceRecord source_record(const std::string& path, const char* role, const ImageInfo& info) {
@@ -132,37 +138,39 @@ Result<BuildPlan> plan_build(const BuildOptions& o) {
                 fmt::format("--texture-size {}", o.texture_size).c_str(), "16, 32, 64, 128, 256, 512, 1024, 2048");
     if (!texture_log2) return texture_log2.error();
 
-    BuildPlan plan;
-    const OpenOptions open_options{o.memory_bytes / 4};
-    auto dem = open_heights(o.dem, open_options);
-    if (!dem) return dem.error();
-    plan.dem = std::move(*dem);
-    auto lattice = plan_lattice(o, *plan.dem, *tile_log2);
-    if (!lattice) return Error{lattice.error().code, lattice.error().message};
+    OpenOptions open;
+    open.max_unit_bytes = o.memory_bytes / 4;
+    open.colours = o.colours;
+    auto mosaic = plan_mosaic({o.dems, o.images, o.crs, o.assume_crs, o, o.assume_same_datum, open, *tile_log2});
+    if (!mosaic) return mosaic.error();
+    BuildPlan plan(std::move(*mosaic));
+    plan.open = open;
+    const MosaicPlan& m = plan.mosaic;
+    if (!m.imagery.empty() && !plan.open.colours.stretch) {
+        std::vector<std::string> images;
+        for (const PlacedFile& f : m.imagery) images.push_back(f.path);
+        auto stretch = choose_stretch(images, plan.open);
+        if (!stretch) return stretch.error();
+        plan.open.colours.stretch = *stretch;
+    }
     Dataset& d = plan.dataset;
-    d.lattice = *lattice;
+    d.lattice = m.lattice;
     d.texture_size_log2 = *texture_log2;
-    if (plan.dem->georeference()) {
-        d.crs = plan.dem->georeference()->crs;
-        d.crs_name = plan.dem->georeference()->crs_name;
-        d.vertical_datum = plan.dem->georeference()->vertical_datum;
+    if (m.crs_known) {
+        d.crs = m.crs.text();
+        d.crs_name = m.crs.name();
     }
+    d.vertical_datum = m.vertical_datum;
     d.attribution = o.attribution;
-    d.sources.push_back(source_record(o.dem, "heights", plan.dem->info()));
-    double source_texel = d.lattice.spacing_m;
-    if (o.imagery) {
-        auto imagery = ImageSource::open(*o.imagery, open_options);
-        if (!imagery) return imagery.error();
-        plan.imagery = std::move(*imagery);
-        if (auto ok = plan_imagery(o, plan); !ok) return ok.error();
-        source_texel = std::min(plan.imagery_where.column_x, -plan.imagery_where.row_y);
-        d.has_imagery = true;
-        d.sources.push_back(source_record(*o.imagery, "imagery", plan.imagery->info()));
-    }
-    d.texture_deepest_level = texture_depth(d, source_texel);
+    for (const PlacedFile& f : m.heights) d.sources.push_back(source_record(f.path, "heights", f.info));
+    for (const PlacedFile& f : m.imagery) d.sources.push_back(source_record(f.path, "imagery", f.info));
+    d.has_imagery = !m.imagery.empty();
+    const double cell_m = m.base_lattice().spacing_m, source_texel = d.has_imagery ? m.finest_pixel_m : cell_m;
+    d.texture_deepest_level = texture_depth(d, cell_m, source_texel);
     if (!tile_key(d.lattice, {d.texture_deepest_level, 0, 0}))
         return input_error(fmt::format("imagery of {} m a pixel needs texture level {}, beyond the format's keys",
                                        source_texel, d.texture_deepest_level));
+    choose_ways(o, plan);
     plan_resources(o, plan);
     if (plan.memory_bytes > o.memory_bytes)
         return usage_error(fmt::format("--memory {} MiB is not enough for these widths: {} MiB are needed",

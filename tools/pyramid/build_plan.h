@@ -5,19 +5,28 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "common/dataset.h"
 #include "common/result.h"
-#include "tools/source/height_source.h"
+#include "tools/mosaic/mosaic_plan.h"
+#include "tools/pyramid/void_fill.h"
 
 namespace scree {
 
 inline constexpr std::int64_t kMinMemoryBytes = std::int64_t{192} << 20;
 
 struct BuildOptions : HeightReading {
-    std::string dem;
-    std::optional<std::string> imagery;
+    std::vector<std::string> dems;    ///< files and folders; later ones lie on top
+    std::vector<std::string> images;  ///< the same; none: a tint made from the heights
     std::string out;
+    std::optional<std::string> crs;         ///< the dataset's; none: chosen
+    std::optional<std::string> assume_crs;  ///< of files that name none
+    bool assume_same_datum = false;
+    Kernel kernel = Kernel::bilinear;  ///< where samples are not lattice points
+    ColourReading colours;
+    FillRule fill;  ///< of interior voids; a value in metres
     std::optional<double> height_quantum_m;
     int tile_size = 33;
     int texture_size = 256;
@@ -29,17 +38,23 @@ struct BuildOptions : HeightReading {
 };
 
 struct BuildPlan {
-    std::unique_ptr<ImageSource> dem;
-    std::unique_ptr<ImageSource> imagery;   ///< or null
-    Georeference imagery_where;             ///< resolved, in the dataset's CRS
+    explicit BuildPlan(MosaicPlan m) : mosaic(std::move(m)) {}
+
+    MosaicPlan mosaic;
+    OpenOptions open;  ///< how files are opened
+    /// One file whose rows are the lattice's rows: it is read straight through, without a copy on disk.
+    bool heights_in_place = false;
+    bool imagery_in_place = false;
+    bool integer_heights = false;           ///< every height is an integer of the file's, nothing is resampled
+    bool wide_heights = false;              ///< values do not fit float32
     Dataset dataset;                        ///< lattice, CRS, texture depth; heights still unknown
     std::int64_t memory_bytes = 0;          ///< estimate of the peak
     std::int64_t temporary_bytes = 0;       ///< disk, during the build
     std::int64_t store_bytes_estimate = 0;  ///< an upper figure
 };
 
-/// Errors: ErrorCode::input for a source that cannot be used as it is (geographic, rotated, not square, no common
-/// place), ErrorCode::usage for options that make no sense together or a memory ceiling below what the widths need.
+/// Errors: those of plan_mosaic; ErrorCode::usage for options that make no sense together or a memory ceiling below
+/// what the widths need.
 Result<BuildPlan> plan_build(const BuildOptions& options);
 
 }  // namespace scree

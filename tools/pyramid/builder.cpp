@@ -13,6 +13,7 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <thread>
@@ -24,9 +25,12 @@
 #include "tools/pyramid/height_pyramid.h"
 #include "tools/pyramid/height_spool.h"
 #include "tools/pyramid/imagery_rows.h"
+#include "tools/pyramid/row_bands.h"
 #include "tools/pyramid/texture_pyramid.h"
 #include "tools/pyramid/tint.h"
+#include "tools/pyramid/warp_error.h"
 #include "tools/source/isolated_decoder.h"
+#include "tools/source/suspect_values.h"
 
 namespace scree {
 namespace {
@@ -35,24 +39,147 @@ constexpr std::int64_t kSpoolBandRows = 16;
 
 Error interrupted() { return {ErrorCode::interrupted, "stopped; nothing was written"}; }
 
-Result<void> spool_heights(BuildPlan& plan, const BuildOptions& options, HeightSpool& spool, Progress& progress,
-                           const std::atomic<bool>& stop, double pixels_done) {
-    const ImageInfo& info = plan.dem->info();
+double megapixels(const std::vector<PlacedFile>& files) {
+    double sum = 0;
+    for (const PlacedFile& f : files)
+        sum += static_cast<double>(f.info.width) * static_cast<double>(f.info.height) / 1e6;
+    return sum;
+}
+double image_megapixels(const BuildPlan& plan) { return megapixels(plan.mosaic.imagery); }
+
+// The one DEM whose rows are the lattice's.
+Result<void> spool_in_place(const BuildPlan& plan, const BuildOptions& options, HeightSpool& spool, Progress& progress,
+                            const std::atomic<bool>& stop, std::vector<std::string>& warnings) {
+    auto dem = open_heights(plan.mosaic.heights.front().path, plan.open);
+    if (!dem) return dem.error();
+    const ImageInfo& info = (*dem)->info();
+    if (info.width != spool.width() || info.height != spool.height())
+        return Error{ErrorCode::input,
+                     fmt::format("{}: has changed while it was read", plan.mosaic.heights.front().path)};
     const VoidRule voids(info, options);
+    SuspectValues suspects(info, options);
     std::vector<double> band(static_cast<std::size_t>(kSpoolBandRows * info.width));
     for (std::int64_t j = 0; j < info.height; j += kSpoolBandRows) {
         if (stop) return interrupted();
         const std::int64_t rows = std::min(kSpoolBandRows, info.height - j);
         const auto count = static_cast<std::size_t>(rows * info.width);
-        if (auto ok = plan.dem->read_channel(j, j + rows, std::span<double>(band.data(), count)); !ok) return ok;
+        if (auto ok = (*dem)->read_channel(j, j + rows, std::span<double>(band.data(), count)); !ok) return ok;
         for (std::int64_t r = 0; r < rows; ++r) {
             const std::span<double> row(band.data() + r * info.width, static_cast<std::size_t>(info.width));
+            suspects.add(row);
             voids.apply(row);
             if (auto ok = spool.append(row); !ok) return ok;
         }
-        progress.update(pixels_done + static_cast<double>((j + rows) * info.width) / 1e6);
+        progress.add(static_cast<double>(rows * info.width) / 1e6);
+    }
+    if (auto warning = suspects.warning(plan.mosaic.heights.front().path)) warnings.push_back(std::move(*warning));
+    return {};
+}
+
+StackOptions stack_options(const BuildPlan& plan, const BuildOptions& options) {
+    return {options.kernel, plan.open, options, options.out};
+}
+
+Result<std::unique_ptr<HeightStack>> read_stack(const BuildPlan& plan, const BuildOptions& options, Progress& progress,
+                                                const std::atomic<bool>& stop) {
+    const MosaicPlan& m = plan.mosaic;
+    const auto on_samples = [&](std::int64_t samples) {
+        progress.add(static_cast<double>(samples) / 1e6);
+        return !stop.load();
+    };
+    return HeightStack::read(m.heights, m.height_layers, m.same_units, stack_options(plan, options), on_samples);
+}
+
+TargetGrid grid_of(const Lattice& lattice) { return {lattice.origin_x_m, lattice.origin_y_m, lattice.spacing_m}; }
+
+Result<void> spool_stack(const BuildPlan& plan, const HeightStack& stack, HeightSpool& spool,
+                         const std::atomic<bool>& stop) {
+    auto grid = stack.on(grid_of(plan.mosaic.base_lattice()), plan.mosaic.crs);
+    if (!grid) return grid.error();
+    RowBands<double> bands(spool.width(),
+                           [&](std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
+                               std::span<double> out) { return (*grid)->sample(i, j, columns, rows, 1, out); });
+    for (std::int64_t j = 0; j < spool.height(); ++j) {
+        if (stop) return interrupted();
+        auto values = bands.row(j);
+        if (!values) return values.error();
+        if (auto ok = spool.append(*values); !ok) return ok;
     }
     return {};
+}
+
+// Interior voids get heights; what was left is said.
+Result<void> fill_voids(const BuildPlan& plan, const BuildOptions& options, const HeightUnits& units,
+                        HeightSpool& spool, const std::atomic<bool>& stop, BuildReport& report, HeightRange& range) {
+    FillRule rule = options.fill;
+    rule.integer = plan.integer_heights;
+    if (rule.kind == FillRule::Kind::value) rule.value = (rule.value - units.offset_m) / units.scale;
+    auto filled = fill_interior_voids(spool, rule, options.memory_bytes / 8, [&] { return !stop.load(); });
+    if (!filled) return filled.error().code == ErrorCode::interrupted ? interrupted() : filled.error();
+    report.filled_samples = filled->filled_samples;
+    if (filled->filled_samples > 0) range.include({filled->min_raw, filled->max_raw});
+    if (filled->filled_samples > 0)
+        report.notes.push_back(
+            fmt::format("{} samples of {} interior voids were filled", filled->filled_samples, filled->filled_regions));
+    if (filled->too_large_regions > 0)
+        report.notes.push_back(fmt::format(
+            "{} interior voids ({} samples) are too large to fill and stay absent; the largest spans {} x {} "
+            "samples at column {}, row {} of the lattice",
+            filled->too_large_regions, filled->too_large_samples, filled->largest_left.width,
+            filled->largest_left.height, filled->largest_left.west, filled->largest_left.north));
+    return {};
+}
+
+// Where finer layers go on below the dense part.
+struct DeepPart {
+    DeepTree tree;
+    std::unique_ptr<HeightGrid> grid;
+    std::optional<DeepHeights> heights;
+};
+
+// Every block of samples that a layer has deepens the tiles under it.
+Result<void> mark_layer(const MosaicPlan& m, const HeightStack& stack, std::size_t k, DeepTree& tree) {
+    const Layer& layer = stack.layer(k);
+    auto transform = CrsTransform::make(layer.crs, m.crs);
+    if (!transform) return transform.error();
+    constexpr auto kBlock = static_cast<double>(RasterSpool<float>::kBlock);
+    const auto last_column = static_cast<double>(layer.columns - 1), last_row = static_cast<double>(layer.rows - 1);
+    for (const HeightStack::Block& block : stack.blocks(k)) {
+        std::vector<double> x, y;
+        for (const double v : {0.0, kBlock / 2, kBlock})
+            for (const double u : {0.0, kBlock / 2, kBlock}) {
+                const double column = std::min(static_cast<double>(block.column) + u, last_column),
+                             row = std::min(static_cast<double>(block.row) + v, last_row);
+                x.push_back(layer.where.x(column, row));
+                y.push_back(layer.where.y(column, row));
+            }
+        transform->apply(x, y);
+        double west = std::numeric_limits<double>::infinity(), north = west, east = -west, south = -west;
+        for (std::size_t p = 0; p < x.size(); ++p) {
+            const double i = m.lattice.i_of(x[p]), j = m.lattice.j_of(y[p]);
+            if (!std::isfinite(i) || !std::isfinite(j)) continue;
+            west = std::min(west, i);
+            east = std::max(east, i);
+            north = std::min(north, j);
+            south = std::max(south, j);
+        }
+        if (west <= east) tree.mark(west, north, east, south, m.layer_level[k]);
+    }
+    return {};
+}
+
+Result<std::unique_ptr<DeepPart>> plan_depth(const BuildPlan& plan, const HeightStack& stack, const HeightSpool& spool,
+                                             const HeightQuantizer& quantizer) {
+    const MosaicPlan& m = plan.mosaic;
+    auto deep = std::make_unique<DeepPart>(DeepPart{DeepTree(m.lattice, m.base_lattice().deepest_level), nullptr, {}});
+    for (std::size_t k = 0; k < stack.layer_count(); ++k)
+        if (auto ok = mark_layer(m, stack, k, deep->tree); !ok) return ok.error();
+    deep->tree.grade();
+    auto grid = stack.on(m.finest_grid(), m.crs);
+    if (!grid) return grid.error();
+    deep->grid = std::move(*grid);
+    deep->heights.emplace(*deep->grid, spool, quantizer, m.base_shift);
+    return deep;
 }
 
 // Presence and tint of the cells under the texel rows, taken from the spool as rows are asked for in order.
@@ -123,35 +250,28 @@ void compose_row(const CellRows& cells, const Lattice& lattice, double cells_per
     std::memset(texels + 4 * c, 0, static_cast<std::size_t>(4 * (width - c)));
 }
 
+// Rows of RGBA texels of the imagery, in order; alpha 0 where it has none.
+using TexelRows = std::function<Result<void>(std::int64_t r, std::span<std::uint8_t> out)>;
+
 struct TextureStage {
-    BuildPlan& plan;
+    const BuildPlan& plan;
+    const BuildOptions& options;
     HeightSpool& spool;
     const HeightQuantizer& quantizer;
     const HeightPyramidResult& heights;
     SqliteStoreWriter& writer;
     Progress& progress;
     const std::atomic<bool>& stop;
-    double pixels_done;
 };
 
-Result<std::int64_t> build_textures(TextureStage& s) {
+Result<std::int64_t> compose_textures(TextureStage& s, const TexelRows& imagery) {
     const Dataset& d = s.plan.dataset;
-    const Lattice& lattice = d.lattice;
+    const Lattice lattice = s.plan.mosaic.base_lattice();
     TexturePyramid pyramid({&s.writer, lattice, d.texture_size_log2, d.texture_deepest_level, &s.heights.tiles});
     const double cells_per_texel = d.texel_m(d.texture_deepest_level) / lattice.spacing_m;  // a power of two, <= 1
-    std::optional<ImageryRows> imagery;
-    double pixels_per_row = 0;
-    if (s.plan.imagery) {
-        const double texel = d.texel_m(d.texture_deepest_level);
-        imagery.emplace(
-            *s.plan.imagery, s.plan.imagery_where,
-            TexelGrid{lattice.origin_x_m + texel / 2, lattice.origin_y_m - texel / 2, texel, pyramid.width()});
-        const ImageInfo& info = s.plan.imagery->info();
-        pixels_per_row =
-            static_cast<double>(info.width) * static_cast<double>(info.height) / static_cast<double>(pyramid.height());
-    }
     CellRows cells(s.spool, s.quantizer, {d.min_height_m, d.max_height_m, lattice.spacing_m});
     const std::int64_t row_bytes = pyramid.width() * 4;
+    const double pixels_per_row = image_megapixels(s.plan) / static_cast<double>(pyramid.height());
     for (std::int64_t r = 0; r < pyramid.height(); r += pyramid.rows_per_push()) {
         if (s.stop) return interrupted();
         for (std::int64_t k = 0; k < pyramid.rows_per_push(); ++k) {
@@ -162,25 +282,52 @@ Result<std::int64_t> build_textures(TextureStage& s) {
                 continue;
             }
             if (imagery)
-                if (auto ok = imagery->sample(r + k, {texels, static_cast<std::size_t>(row_bytes)}); !ok)
-                    return ok.error();
+                if (auto ok = imagery(r + k, {texels, static_cast<std::size_t>(row_bytes)}); !ok) return ok.error();
             if (auto ok = cells.move_to(cell_row); !ok) return ok.error();
-            compose_row(cells, lattice, cells_per_texel, pyramid.width(), imagery.has_value(), texels);
+            compose_row(cells, lattice, cells_per_texel, pyramid.width(), static_cast<bool>(imagery), texels);
         }
         if (auto ok = pyramid.push(); !ok) return ok.error();
-        s.progress.update(s.pixels_done + static_cast<double>(r) * pixels_per_row / 1e6);
+        s.progress.add(pixels_per_row * pyramid.rows_per_push());
     }
     return pyramid.finish();
+}
+
+Result<std::int64_t> build_textures(TextureStage& s) {
+    const Dataset& d = s.plan.dataset;
+    const MosaicPlan& m = s.plan.mosaic;
+    if (m.imagery.empty()) return compose_textures(s, {});
+    const double texel = d.texel_m(d.texture_deepest_level);
+    const TargetGrid grid{d.lattice.origin_x_m + texel / 2, d.lattice.origin_y_m - texel / 2, texel};
+    const std::int64_t width = TexturePyramid::width_of(m.base_lattice(), d.texture_size_log2, d.texture_deepest_level);
+    if (s.plan.imagery_in_place) {
+        auto image = ImageSource::open(m.imagery.front().path, s.plan.open);
+        if (!image) return image.error();
+        ImageryRows rows(**image, m.imagery.front().where, {grid.x_m, grid.y_m, grid.step_m, width});
+        return compose_textures(s, [&](std::int64_t r, std::span<std::uint8_t> out) { return rows.sample(r, out); });
+    }
+    auto stack = ImageStack::read(m.imagery, m.image_layers, grid, m.crs, stack_options(s.plan, s.options),
+                                  [&](std::int64_t) { return !s.stop.load(); });
+    if (!stack) return stack.error();
+    RowBands<std::uint32_t> bands(
+        width, [&](std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
+                   std::span<std::uint32_t> out) { return (*stack)->sample(i, j, columns, rows, out); });
+    return compose_textures(s, [&](std::int64_t r, std::span<std::uint8_t> out) -> Result<void> {
+        auto row = bands.row(r);
+        if (!row) return row.error();
+        std::memcpy(out.data(), row->data(), out.size());
+        return {};
+    });
 }
 
 }  // namespace
 
 Result<void> announce_build(const BuildPlan& plan, const BuildOptions& options) {
     std::error_code error;
-    for (const std::string* input : {&options.dem, options.imagery ? &*options.imagery : nullptr})
-        if (input != nullptr && std::filesystem::equivalent(*input, options.out, error))
-            return Error{ErrorCode::usage,
-                         fmt::format("{}: is an input, and the output would replace it", options.out)};
+    for (const auto* files : {&plan.mosaic.heights, &plan.mosaic.imagery})
+        for (const PlacedFile& input : *files)
+            if (std::filesystem::equivalent(input.path, options.out, error))
+                return Error{ErrorCode::usage,
+                             fmt::format("{}: is an input, and the output would replace it", options.out)};
     if (std::filesystem::exists(options.out, error) && !options.force)
         return Error{ErrorCode::usage, fmt::format("{}: exists; --force replaces it", options.out)};
     const auto folder = std::filesystem::absolute(options.out, error).parent_path();
@@ -205,46 +352,83 @@ Result<BuildReport> build_store(BuildPlan plan, const BuildOptions& options, con
         options.threads > 0 ? options.threads : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
     Dataset& d = plan.dataset;
-    const ImageInfo dem = plan.dem->info();
-    const double dem_pixels = static_cast<double>(dem.width) * static_cast<double>(dem.height) / 1e6;
-    double image_pixels = 0;
-    if (plan.imagery)
-        image_pixels =
-            static_cast<double>(plan.imagery->info().width) * static_cast<double>(plan.imagery->info().height) / 1e6;
+    const Lattice lattice = plan.mosaic.base_lattice();
+    const std::int64_t width = lattice.cells_x + 1, height = lattice.cells_y + 1;
+    const double dem_pixels = megapixels(plan.mosaic.heights),
+                 lattice_points = static_cast<double>(width) * static_cast<double>(height) / 1e6;
 
     auto partial = PartialFile::create(options.out + ".partial");
     if (!partial) return partial.error();
-    auto spool = HeightSpool::create(options.out + ".heights", dem.width, dem.height, !fits_float32(dem.type));
+    auto spool = HeightSpool::create(options.out + ".heights", width, height, plan.wide_heights);
     if (!spool) return spool.error();
     auto writer = SqliteStoreWriter::create((*partial)->path());
     if (!writer) return writer.error();
     Progress progress("building", "MPix", options.quiet);
-    progress.set_total(2 * dem_pixels + image_pixels);
+    progress.set_total(dem_pixels + lattice_points + image_megapixels(plan));
 
-    if (auto ok = spool_heights(plan, options, **spool, progress, stop, 0); !ok) return ok.error();
+    std::unique_ptr<HeightStack> stack;
+    if (!plan.heights_in_place) {
+        auto read = read_stack(plan, options, progress, stop);
+        if (!read) return read.error();
+        stack = std::move(*read);
+    }
+    BuildReport report;
+    if (stack) report.warnings = stack->warnings();
+    auto spooled = stack ? spool_stack(plan, *stack, **spool, stop)
+                         : spool_in_place(plan, options, **spool, progress, stop, report.warnings);
+    if (!spooled) return spooled.error();
+    const std::string& first_dem = plan.mosaic.heights.front().path;
     auto summary = (*spool)->finish();
-    if (!summary) return Error{summary.error().code, fmt::format("{}: {}", options.dem, summary.error().message)};
-    auto quantizer = choose_quantizer({is_integer(dem.type), options.height_scale, options.height_offset_m,
-                                       options.height_quantum_m, summary->min_raw, summary->max_raw});
-    if (!quantizer) return Error{quantizer.error().code, fmt::format("{}: {}", options.dem, quantizer.error().message)};
+    if (!summary) return Error{summary.error().code, fmt::format("{}: {}", first_dem, summary.error().message)};
+    HeightRange range{summary->min_raw, summary->max_raw};
+    if (plan.mosaic.base_shift > 0) range.include(stack->range());  // between the spool's points there are others
+    HeightUnits units;
+    if (plan.mosaic.same_units)
+        units = units_of(plan.mosaic.heights.front().info, plan.mosaic.heights.front().where, options);
+    if (auto ok = fill_voids(plan, options, units, **spool, stop, report, range); !ok) return ok.error();
+    auto quantizer = choose_quantizer(
+        {plan.integer_heights, units.scale, units.offset_m, options.height_quantum_m, range.low, range.high});
+    if (!quantizer) return Error{quantizer.error().code, fmt::format("{}: {}", first_dem, quantizer.error().message)};
 
-    auto heights = build_height_pyramid({spool->get(), writer->get(), d.lattice, *quantizer, [&](std::int64_t rows) {
-                                             progress.update(dem_pixels + static_cast<double>(rows * dem.width) / 1e6);
+    std::unique_ptr<DeepPart> deep;
+    if (plan.mosaic.base_shift > 0) {
+        auto planned = plan_depth(plan, *stack, **spool, *quantizer);
+        if (!planned) return planned.error();
+        deep = std::move(*planned);
+    }
+    WarpError warp;
+    if (stack && (!plan.mosaic.heights_copied || deep)) {
+        WarpErrorJob job{*stack, plan.mosaic.same_units, **spool, plan.mosaic, *quantizer};
+        if (deep) {
+            job.tree = &deep->tree;
+            job.deep = &*deep->heights;
+        }
+        job.stop = &stop;
+        auto measured = measure_warp_error(job);
+        if (!measured) return measured.error();
+        warp = *measured;
+    }
+    auto heights = build_height_pyramid({spool->get(), writer->get(), lattice, *quantizer,
+                                         [&](std::int64_t) {
+                                             progress.add(static_cast<double>(width) / 1e6);
                                              return !stop.load();
-                                         }});
+                                         },
+                                         deep ? &deep->tree : nullptr, deep ? &*deep->heights : nullptr, d.lattice});
     if (!heights) return heights.error().code == ErrorCode::interrupted ? interrupted() : heights.error();
     if (heights->tile_count == 0)
         return Error{ErrorCode::input,
-                     fmt::format("{}: no cell has four valid corners: there is nothing to build", options.dem)};
+                     fmt::format("{}: no cell has four valid corners: there is nothing to build", first_dem)};
     d.height_offset_m = quantizer->height_offset_m;
     d.height_quantum_m = quantizer->quantum_m;
     d.height_quantum_error_m = heights->worst_quantum_error_m > 0 ? quantizer->quantum_m / 2 : 0;
+    d.warp_error_m = warp.greatest_m;
     d.min_height_m = d.height_m(heights->min_n);
     d.max_height_m = d.height_m(heights->max_n);
     d.height_tiles = heights->tile_count;
     d.present_cells = heights->present_cells;
+    if (heights->coarsest_leaf_level < d.lattice.deepest_level) d.coarsest_leaf_level = heights->coarsest_leaf_level;
 
-    TextureStage stage{plan, **spool, *quantizer, *heights, **writer, progress, stop, 2 * dem_pixels};
+    TextureStage stage{plan, options, **spool, *quantizer, *heights, **writer, progress, stop};
     auto textures = build_textures(stage);
     if (!textures) return textures.error();
     d.texture_tiles = *textures;
@@ -253,13 +437,14 @@ Result<BuildReport> build_store(BuildPlan plan, const BuildOptions& options, con
     if (auto ok = (*partial)->rename_to(options.out); !ok) return ok.error();
     progress.finish();
 
-    BuildReport report;
     report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     const ProcessUsage usage = process_usage();
     const DecoderUsage decoders = decoder_usage();
     report.cpu_seconds = usage.cpu_seconds + decoders.cpu_seconds;
     report.peak_rss_bytes = usage.peak_rss_bytes + decoders.peak_rss_bytes;
-    report.source_megapixels = dem_pixels + image_pixels;
+    report.warp_error_m = warp.greatest_m;
+    report.warp_rms_m = warp.rms_m;
+    report.source_megapixels = dem_pixels + image_megapixels(plan);
     report.height_tiles = d.height_tiles;
     report.texture_tiles = d.texture_tiles;
     std::error_code error;

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "common/result.h"
 #include "tools/pyramid/build_plan.h"
@@ -16,10 +17,13 @@ struct BuildReport {
     double cpu_seconds = 0;
     std::int64_t peak_rss_bytes = 0;
     double source_megapixels = 0;
+    double warp_error_m = 0, warp_rms_m = 0;  ///< what resampling cost (warp_error.h); 0: heights were copied
     std::int64_t height_tiles = 0;
     std::int64_t texture_tiles = 0;
     std::int64_t store_bytes = 0;
-    std::string warning;  ///< what the user should know, or empty
+    std::int64_t filled_samples = 0;    ///< of interior voids
+    std::vector<std::string> warnings;  ///< what the user should look into
+    std::vector<std::string> notes;     ///< what was done that may surprise
 };
 
 /// Checks the disk and that OUT may be written; prints what will be needed unless quiet.

@@ -7,6 +7,8 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <mutex>
+#include <optional>
 
 #include "common/mesh/geometric_error.h"
 #include "common/store/height_codec.h"
@@ -44,10 +46,12 @@ struct TileRecord {
     std::array<double, kMaxLevel + 1> ancestor_error{};  // deepest tiles: error of each ancestor's coarsest block here
     std::int64_t present_cells = 0;
     std::vector<std::uint8_t> payload;
+    std::optional<BranchSummary> branch;  // what finer data makes of the tile
+    Result<void> outcome;
 };
 
 struct ParentRecord {
-    std::uint8_t child_mask = 0;
+    std::uint8_t child_mask = 0, leaf_mask = 0;
     std::array<HeightBounds, 4> children;
     double coarsest_error = 0;
 };
@@ -86,6 +90,9 @@ public:
         valid_.resize(static_cast<std::size_t>((m_ + 1) * (lattice_.cells_x + 1)));
         raw_.resize(static_cast<std::size_t>(lattice_.cells_x + 1));
         row_.resize(levels_.back().samples.size() / static_cast<std::size_t>(m_ + 1));
+        if (job.deep_tree != nullptr)
+            branches_.emplace(job.finest, *job.deep_tree, *job.deep_heights,
+                              [this](TileId id, const std::vector<std::uint8_t>& payload) { return put(id, payload); });
     }
 
     Result<HeightPyramidResult> run() {
@@ -212,33 +219,72 @@ private:
         const auto [low, high] = std::minmax_element(tile.samples.begin(), tile.samples.end());
         record.bounds.min_n = *low;
         record.bounds.max_n = *high;
+        const std::int64_t i = column * m_, j = band.band * m_;
+        const TileId id{lattice_.deepest_level, column, band.band};
+        if (branches_ && job_.deep_tree->refined(id)) {
+            record.outcome = deepen(id, tile, record);
+            return record;
+        }
         const auto errors = leaf_errors(finest);
         for (int g = 0; g < n_; ++g)
             record.bounds.error_n[static_cast<std::size_t>(g)] = round_up_to_float(errors[static_cast<std::size_t>(g)]);
-        let_errors_grow(record.bounds);
-
-        const std::int64_t i = column * m_, j = band.band * m_;
+        let_errors_grow(record.bounds, n_);
         for (int level = 0; level < lattice_.deepest_level; ++level) {
-            const std::int64_t extent = lattice_.tile_extent(level), stride = extent / 2;
-            const std::int64_t bi = i / extent * extent, bj = j / extent * extent;
-            BlockVertices block{};
-            for (std::int64_t k = 0; k < 9; ++k)
-                block[static_cast<std::size_t>(k)] = corners_.vertex(bi + k % 3 * stride, bj + k / 3 * stride);
+            const AncestorBlock block = ancestor_block(level, i, j);
             record.ancestor_error[static_cast<std::size_t>(level)] =
-                coarse_block_error(block, stride, i - bi, j - bj, finest);
+                coarse_block_error(block.vertices, block.stride, block.offset_i, block.offset_j, finest);
         }
         tile.header.own = record.bounds;
         record.payload = encode_height_tile(tile, n_, HeightCodec::plane);
         return record;
     }
 
-    // A parent's finest level has the error of its children's second: the growth goes on from level to level.
-    void let_errors_grow(HeightBounds& bounds) const {
-        for (int g = 1; g < n_; ++g) {
-            float& error = bounds.error_n[static_cast<std::size_t>(g)];
-            const float grown = kErrorGrowth * bounds.error_n[static_cast<std::size_t>(g - 1)];
-            error = std::max(error, std::min(grown, kMaxErrorUnits));
+    AncestorBlock ancestor_block(int level, std::int64_t i, std::int64_t j) const {
+        const std::int64_t extent = lattice_.tile_extent(level), stride = extent / 2;
+        const std::int64_t bi = i / extent * extent, bj = j / extent * extent;
+        AncestorBlock block{{}, stride, i - bi, j - bj};
+        for (std::int64_t k = 0; k < 9; ++k)
+            block.vertices[static_cast<std::size_t>(k)] = corners_.vertex(bi + k % 3 * stride, bj + k / 3 * stride);
+        return block;
+    }
+
+    // Builds what lies under a tile of the deepest level of this lattice, and the tile over it.
+    Result<void> deepen(TileId id, HeightTile& tile, TileRecord& record) const {
+        std::vector<AncestorBlock> blocks;
+        for (int level = 0; level < id.level; ++level) blocks.push_back(ancestor_block(level, id.x * m_, id.y * m_));
+        AncestorBlock own{{}, m_ / 2, 0, 0};
+        for (std::int64_t k = 0; k < 9; ++k)
+            own.vertices[static_cast<std::size_t>(k)] =
+                tile.samples[static_cast<std::size_t>(k / 3 * (m_ / 2) * (m_ + 1) + k % 3 * (m_ / 2))];
+        blocks.push_back(own);
+        auto built = branches_->build(id, tile.presence, blocks);
+        if (!built) return built.error();
+        BranchSummary all;
+        all.min_n = std::numeric_limits<std::int32_t>::max();
+        all.max_n = std::numeric_limits<std::int32_t>::min();
+        std::vector<HeightBounds> existing;
+        for (std::size_t q = 0; q < 4; ++q) {
+            const BranchSummary& child = built->quadrant[q];
+            if (!child.exists) continue;
+            existing.push_back(child.bounds);
+            set_child(tile.header, static_cast<int>(q), child.bounds,
+                      child.leaf && id.level + 1 < job_.finest.deepest_level);
+            all.coarsest_leaf = std::min(all.coarsest_leaf, child.coarsest_leaf);
+            all.present_cells += child.present_cells;
+            all.min_n = std::min(all.min_n, child.min_n);
+            all.max_n = std::max(all.max_n, child.max_n);
+            all.worst_quantum_error_m = std::max(all.worst_quantum_error_m, child.worst_quantum_error_m);
+            for (std::size_t level = 0; level < all.ancestor_error.size(); ++level)
+                all.ancestor_error[level] = std::max(all.ancestor_error[level], child.ancestor_error[level]);
         }
+        record.present_cells = all.present_cells;
+        record.ancestor_error = all.ancestor_error;
+        record.bounds = bounds_over(existing, tile.samples, all.ancestor_error[static_cast<std::size_t>(id.level)], n_);
+        tile.presence.clear();
+        tile.header.own = record.bounds;
+        record.payload = encode_height_tile(tile, n_, HeightCodec::plane);
+        record.branch = all;
+        return {};
     }
 
     Result<void> emit_deepest(const LevelBand& band) {
@@ -249,6 +295,14 @@ private:
         for (std::int64_t x = 0; x < band.columns; ++x) {
             const TileRecord& record = records[static_cast<std::size_t>(x)];
             if (!record.exists) continue;
+            if (!record.outcome) return record.outcome;
+            if (record.branch) {
+                result_.coarsest_leaf_level = std::min(result_.coarsest_leaf_level, record.branch->coarsest_leaf);
+                result_.min_n = std::min(result_.min_n, record.branch->min_n);
+                result_.max_n = std::max(result_.max_n, record.branch->max_n);
+                result_.worst_quantum_error_m =
+                    std::max(result_.worst_quantum_error_m, record.branch->worst_quantum_error_m);
+            }
             const TileId id{level, x, band.band};
             result_.present_cells += record.present_cells;
             for (int up = 0; up < level; ++up) {
@@ -257,7 +311,7 @@ private:
                 ancestor.coarsest_error =
                     std::max(ancestor.coarsest_error, record.ancestor_error[static_cast<std::size_t>(up)]);
             }
-            if (auto ok = store(id, record.bounds, record.payload); !ok) return ok;
+            if (auto ok = store(id, record.bounds, record.payload, !record.branch); !ok) return ok;
         }
         return {};
     }
@@ -271,7 +325,7 @@ private:
         for (std::int64_t x = 0; x < band.columns; ++x) {
             const TileRecord& record = records[static_cast<std::size_t>(x)];
             if (record.exists)
-                if (auto ok = store({level, x, band.band}, record.bounds, record.payload); !ok) return ok;
+                if (auto ok = store({level, x, band.band}, record.bounds, record.payload, false); !ok) return ok;
         }
         return {};
     }
@@ -281,39 +335,35 @@ private:
         record.exists = true;
         HeightTile tile;
         copy_samples(band, column, tile.samples);
-        const auto [low, high] = std::minmax_element(tile.samples.begin(), tile.samples.end());
-        record.bounds.min_n = *low;
-        record.bounds.max_n = *high;
-        for (int q = 0; q < 4; ++q) {
-            if ((parent.child_mask >> q & 1) == 0) continue;
-            const HeightBounds& child = parent.children[static_cast<std::size_t>(q)];
-            record.bounds.min_n = std::min(record.bounds.min_n, child.min_n);
-            record.bounds.max_n = std::max(record.bounds.max_n, child.max_n);
-            for (int g = 0; g + 1 < n_; ++g) {
-                float& error = record.bounds.error_n[static_cast<std::size_t>(g)];
-                error = std::max(error, child.error_n[static_cast<std::size_t>(g + 1)]);
-            }
-        }
-        float& coarsest = record.bounds.error_n[static_cast<std::size_t>(n_ - 1)];
-        coarsest = round_up_to_float(parent.coarsest_error);
-        let_errors_grow(record.bounds);
+        std::vector<HeightBounds> existing;
+        for (int q = 0; q < 4; ++q)
+            if ((parent.child_mask >> q & 1) != 0) existing.push_back(parent.children[static_cast<std::size_t>(q)]);
+        record.bounds = bounds_over(existing, tile.samples, parent.coarsest_error, n_);
         tile.header.child_mask = parent.child_mask;
+        tile.header.leaf_mask = parent.leaf_mask;
         tile.header.own = record.bounds;
         tile.header.children = parent.children;
         record.payload = encode_height_tile(tile, n_, HeightCodec::plane);
         return record;
     }
 
-    Result<void> store(TileId id, const HeightBounds& bounds, const std::vector<std::uint8_t>& payload) {
+    Result<void> store(TileId id, const HeightBounds& bounds, const std::vector<std::uint8_t>& payload, bool leaf) {
         result_.tiles.insert(id);
-        ++result_.tile_count;
+        if (leaf) result_.coarsest_leaf_level = std::min(result_.coarsest_leaf_level, id.level);
         if (id.level > 0) {
             LevelBand& band = levels_[static_cast<std::size_t>(id.level - 1)];
             ParentRecord& parent = band.parents[static_cast<std::size_t>(id.x >> 1)];
             const int q = quadrant_of(id);
             parent.child_mask = static_cast<std::uint8_t>(parent.child_mask | (1 << q));
+            if (leaf && branches_) parent.leaf_mask = static_cast<std::uint8_t>(parent.leaf_mask | (1 << q));
             parent.children[static_cast<std::size_t>(q)] = bounds;
         }
+        return put(id, payload);
+    }
+
+    Result<void> put(TileId id, const std::vector<std::uint8_t>& payload) {
+        const std::lock_guard lock(writing_);
+        ++result_.tile_count;
         return job_.writer->put(TileKind::height, *tile_key(lattice_, id), static_cast<int>(HeightCodec::plane),
                                 payload);
     }
@@ -328,6 +378,8 @@ private:
     std::vector<double> raw_;
     std::vector<std::int32_t> row_;  // current row, padded
     HeightPyramidResult result_;
+    std::optional<DeepBranches> branches_;
+    std::mutex writing_;
 };
 
 }  // namespace

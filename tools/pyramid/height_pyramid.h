@@ -9,6 +9,7 @@
 
 #include "common/dataset.h"
 #include "common/store/sqlite_store.h"
+#include "tools/pyramid/deep_branch.h"
 #include "tools/pyramid/height_quantizer.h"
 #include "tools/pyramid/height_spool.h"
 #include "tools/pyramid/tile_set.h"
@@ -21,12 +22,18 @@ struct HeightPyramidJob {
     Lattice lattice;
     HeightQuantizer quantizer;
     std::function<bool(std::int64_t rows_done)> on_rows;  ///< returns false to stop
+    /// Where finer data goes on below the lattice's deepest level: which tiles do, and the points of the lattice
+    /// `finest`, whose cells are this one's divided. Null: nowhere.
+    const DeepTree* deep_tree = nullptr;
+    const DeepHeights* deep_heights = nullptr;
+    Lattice finest{};
 };
 
 struct HeightPyramidResult {
     TileSet tiles;
     std::int64_t tile_count = 0;
     std::int64_t present_cells = 0;
+    int coarsest_leaf_level = kMaxLevel;
     std::int32_t min_n = 0, max_n = 0;  ///< over valid samples
     double worst_quantum_error_m = 0;   ///< over valid samples
 };

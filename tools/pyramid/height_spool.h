@@ -1,14 +1,20 @@
-// HeightSpool: the source heights as one row-major temporary file, voids filled, with a validity bit a sample. The
-// builder reads the source once, then knows range and fill before it quantises, and holds no image in memory.
+// HeightSpool: the lattice's heights as one row-major temporary file. The builder reads the source once, then knows
+// range and voids before it quantises, and holds no image in memory. A sample without a height is a void (inside some
+// file) or uncovered (no file reaches it); only interior voids can get one later (void_fill.h). Values are kept as they
+// came, in float32 or double; what stands under absent samples is made when a row is read.
 //
-// Fill rule (docs/building-pyramids.md): in a row, a void takes the value interpolated linearly between the nearest
-// valid samples west and east of it, or the nearest one's where there is only one. A row without any valid sample
-// repeats the row above it; such rows at the top repeat the first row that has one. Filled samples are never drawn over
-// present cells; they only give coarse meshes at the data's edge somewhere to stand.
+// Support rule (docs/building-pyramids.md): in a row, an absent sample reads as the value interpolated linearly between
+// the nearest valid samples west and east of it, or the nearest one's where there is only one. A row without any valid
+// sample repeats the row above it; such rows at the top repeat the first row that has one. Samples that write_samples
+// made valid count as valid. Support is never drawn over present cells; it only gives coarse meshes at the data's edge
+// somewhere to stand.
+//
+// Not thread-safe but where said otherwise: one thread at a time.
 #pragma once
 
 #include <cstdint>
 #include <cstdio>
+#include <limits>
 #include <memory>
 #include <span>
 #include <string>
@@ -17,6 +23,10 @@
 #include "common/result.h"
 
 namespace scree {
+
+/// Samples without a height, as append takes and read_samples gives them.
+constexpr double kVoidSample = std::numeric_limits<double>::quiet_NaN();
+constexpr double kUncoveredSample = -std::numeric_limits<double>::infinity();
 
 class HeightSpool {
 public:
@@ -31,23 +41,44 @@ public:
                                                        bool wide);
     static std::int64_t bytes_needed(std::int64_t width, std::int64_t height, bool wide);
 
-    /// Appends the next row; NaN marks a void.
+    /// Appends the next row: -infinity marks an uncovered sample, NaN and +infinity a void.
     Result<void> append(std::span<const double> row);
     /// After the last row. Errors: ErrorCode::input when no sample is valid.
     Result<Summary> finish();
 
-    /// Row j: filled raw values and one byte a sample, 1 = valid.
+    /// Row j: raw values, support where there is none, and one byte a sample, 1 = valid.
     Result<void> read_row(std::int64_t j, std::span<double> values, std::span<std::uint8_t> valid);
     /// Validity alone.
     Result<void> read_valid(std::int64_t j, std::span<std::uint8_t> valid);
 
+    /// Samples [i, i + columns) x [j, j + rows) as read_row gives them. Any thread, while nothing is written.
+    Result<void> read_window(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
+                             std::span<double> values, std::span<std::uint8_t> valid) const;
+
+    /// False: every sample of row j was valid when it was appended.
+    bool may_lack_samples(std::int64_t j) const;
+    /// Samples [i, i + out.size()) of row j as they came: values, kVoidSample, kUncoveredSample.
+    Result<void> read_samples(std::int64_t i, std::int64_t j, std::span<double> out);
+    /// Replaces samples of row j, which must have a valid sample already. Summary is not changed by it.
+    Result<void> write_samples(std::int64_t i, std::int64_t j, std::span<const double> values);
+
     std::int64_t width() const { return width_; }
     std::int64_t height() const { return height_; }
+    bool wide() const { return wide_; }
 
 private:
+    enum class RowState : std::uint8_t { all_valid, some_valid, none_valid };
+
     HeightSpool(int fd, std::string path, std::int64_t width, std::int64_t height, bool wide);
-    Result<void> write_row(std::int64_t j, bool all_void);
     Result<const std::uint8_t*> row_bytes(std::int64_t j);
+    Result<void> load_support(std::int64_t j);
+    struct Rows {
+        std::int64_t first, end;
+    };
+    Rows rows_like(std::int64_t j) const;
+    std::int64_t supporting_row(const Rows& lacking) const;
+    Result<void> pread_samples(std::int64_t i, std::int64_t j, std::span<double> out,
+                               std::vector<std::uint8_t>& bytes) const;
 
     struct Descriptor {
         int fd;
@@ -57,13 +88,13 @@ private:
     std::int64_t width_, height_;
     bool wide_;
     std::int64_t row_bytes_;
-    std::int64_t rows_ = 0;
-    std::int64_t leading_void_rows_ = 0;
-    std::vector<double> filled_;
-    std::vector<std::uint8_t> record_;
-    std::vector<std::uint8_t> chunk_;
-    std::int64_t chunk_first_ = 0, chunk_rows_ = 0;
+    std::vector<RowState> rows_;  ///< of the rows appended so far
     Summary summary_;
+    std::vector<std::uint8_t> record_;  ///< samples on their way to or from the file
+    std::vector<std::uint8_t> chunk_;   ///< rows read ahead
+    std::int64_t chunk_first_ = 0, chunk_rows_ = 0;
+    std::vector<double> support_;  ///< what rows [support_first_, support_end_) repeat
+    std::int64_t support_first_ = 0, support_end_ = 0;
 };
 
 }  // namespace scree

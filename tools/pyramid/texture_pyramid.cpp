@@ -212,6 +212,10 @@ TexturePyramid::TexturePyramid(const TexturePyramidJob& job) : impl_(std::make_u
 
 TexturePyramid::~TexturePyramid() = default;
 
+std::int64_t TexturePyramid::width_of(const Lattice& lattice, int texture_size_log2, int deepest_level) {
+    return round_up(texels(lattice.cells_x, lattice, texture_size_log2, deepest_level),
+                    std::int64_t{1} << texture_size_log2);
+}
 std::int64_t TexturePyramid::width() const { return impl_->levels.front().width; }
 std::int64_t TexturePyramid::height() const {
     const auto& job = impl_->job;

@@ -27,6 +27,7 @@ public:
     ~TexturePyramid();
 
     /// Texels a row: the data's extent padded to whole tiles.
+    static std::int64_t width_of(const Lattice& lattice, int texture_size_log2, int deepest_level);
     std::int64_t width() const;
     /// Rows to push: the data's extent padded to whole tiles.
     std::int64_t height() const;

@@ -41,7 +41,8 @@ private:
 /// Program to server, with the file's path as text and the decoder's end of a socket pair as descriptor: make a process
 /// for this file. All that follows goes over that socket pair.
 struct OpenRequest {
-    bool headers_only = false;      ///< parse header and georeference and say whether that went well
+    bool headers_only = false;      ///< parse headers and georeference and say whether that went well
+    std::uint64_t directory = 0;    ///< of a TIFF's mask, as PlainTiff has it; 0: the image
     std::int64_t memory_bytes = 0;  ///< that the process may add to what it has when it begins; 0: no limit
     std::int64_t cpu_seconds = 0;   ///< for the opening
 };

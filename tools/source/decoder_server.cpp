@@ -145,9 +145,17 @@ private:
         Result<ImageHeader> header = read_image_header(path_);
         if (!header) return header.error();
         if (request_.headers_only) {
-            // What it says is the caller's to find out; here it only must come back.
+            // What they say is the caller's to find out; here they only must come back.
+            (void)read_mask_header(path_, *header);
             (void)read_georeference(path_);
             return {};
+        }
+        if (request_.directory != 0) {
+            Result<std::optional<ImageHeader>> mask = read_mask_header(path_, *header);
+            if (!mask) return mask.error();
+            if (!*mask || (*mask)->plain_tiff->directory != request_.directory)
+                return Error{ErrorCode::input, path_ + ": its mask changed while it was read"};
+            *header = std::move(**mask);
         }
         Result<std::unique_ptr<PixelDecoder>> decoder = program_.open(path_, *header);
         if (!decoder) return decoder.error();

@@ -18,13 +18,13 @@
 #include <fmt/format.h>
 #include <tiffio.h>
 
-#include <geotiff/geo_normalize.h>
-#include <geotiff/geokeys.h>
 #include <geotiff/geotiff.h>
-#include <geotiff/geovalues.h>
 #include <geotiff/xtiffio.h>
 
+#include "tools/source/gdal_metadata.h"
+#include "tools/source/geotiff_crs.h"
 #include "tools/source/number_text.h"
+#include "tools/source/projection_file.h"
 #include "tools/source/tiff_file.h"
 
 namespace scree {
@@ -34,10 +34,11 @@ namespace {
 constexpr double kNegligibleRotation = 1e-9;
 // Six numbers of 17 digits fit 200 bytes; what is a thousand times that is not a world file.
 constexpr std::uintmax_t kMaxWorldFileBytes = 65536;
-// The longest citation worth keeping.
-constexpr std::size_t kMaxCitationBytes = 4096;
-// Ground control points are four doubles more than a tie point is; a placed image has one tie point.
+// No CRS has places so far off, and 2^30 steps of this size still have finite sums.
+constexpr double kFarthest = 1e15;
 constexpr std::uint16_t kTiePointDoubles = 6;
+constexpr std::uint16_t kMatrixDoubles = 16;
+constexpr std::uint32_t kGdalMetadataTag = 42112;
 
 struct GtifDeleter {
     void operator()(GTIF* keys) const { GTIFFree(keys); }
@@ -51,90 +52,8 @@ struct GeotiffTags {
     Georeference reference;
     bool has_crs = false;
     bool has_transform = false;
+    int control_points = 0;  ///< where they are all that places the image
 };
-
-std::optional<std::uint16_t> short_key(GTIF* keys, geokey_t key) {
-    unsigned short value = 0;
-    if (GTIFKeyGetSHORT(keys, key, &value, 0, 1) != 1) return std::nullopt;
-    return value;
-}
-
-std::string text_key(GTIF* keys, geokey_t key) {
-    int bytes = 0;
-    tagtype_t type = TYPE_UNKNOWN;
-    const int count = GTIFKeyInfo(keys, key, &bytes, &type);
-    if (count <= 0 || type != TYPE_ASCII) return {};
-    std::string text(std::min<std::size_t>(static_cast<std::size_t>(count), kMaxCitationBytes) + 1, '\0');
-    if (GTIFKeyGetASCII(keys, key, text.data(), static_cast<int>(text.size())) <= 0) return {};
-    text.resize(text.find('\0') == std::string::npos ? text.size() : text.find('\0'));
-    while (!text.empty() && (text.back() == '|' || std::isspace(static_cast<unsigned char>(text.back()))))
-        text.pop_back();
-    return text;
-}
-
-std::string epsg(std::uint16_t code) { return fmt::format("EPSG:{}", code); }
-
-bool is_code(std::optional<std::uint16_t> value) { return value && *value != KvUndefined && *value != KvUserDefined; }
-
-double unit_length_m(std::uint16_t code) {
-    double metres = 1;
-    return GTIFGetUOMLengthInfo(code, nullptr, &metres) == 1 && std::isfinite(metres) && metres > 0 ? metres : 1.0;
-}
-
-double linear_unit_m(GTIF* keys, std::optional<std::uint16_t> projected_code) {
-    const auto unit = short_key(keys, ProjLinearUnitsGeoKey);
-    if (is_code(unit)) return unit_length_m(*unit);
-    if (unit == KvUserDefined) {
-        double metres = 1;
-        if (GTIFKeyGetDOUBLE(keys, ProjLinearUnitSizeGeoKey, &metres, 0, 1) == 1 && std::isfinite(metres) && metres > 0)
-            return metres;
-        return 1;
-    }
-    // The key may be left out when the CRS is an EPSG code: then the registry says it.
-    short registered = 0;
-    if (is_code(projected_code) && GTIFGetPCSInfo(*projected_code, nullptr, nullptr, &registered, nullptr) == 1 &&
-        registered > 0)
-        return unit_length_m(static_cast<std::uint16_t>(registered));
-    return 1;
-}
-
-void read_crs(GTIF* keys, GeotiffTags& tags) {
-    Georeference& reference = tags.reference;
-    const auto model = short_key(keys, GTModelTypeGeoKey);
-    const auto projected = short_key(keys, ProjectedCSTypeGeoKey);
-    const auto geographic = short_key(keys, GeographicTypeGeoKey);
-    reference.geographic = model ? *model == ModelTypeGeographic : (!projected && geographic);
-    tags.has_crs = model || projected || geographic;
-
-    const auto code = reference.geographic ? geographic : projected;
-    if (is_code(code)) reference.crs = epsg(*code);
-    reference.crs_name = text_key(keys, reference.geographic ? GeogCitationGeoKey : PCSCitationGeoKey);
-    if (reference.crs_name.empty()) reference.crs_name = text_key(keys, GTCitationGeoKey);
-    if (!reference.geographic) reference.linear_unit_m = linear_unit_m(keys, projected);
-
-    const auto vertical = short_key(keys, VerticalCSTypeGeoKey);
-    const auto vertical_datum = short_key(keys, VerticalDatumGeoKey);
-    if (is_code(vertical))
-        reference.vertical_datum = epsg(*vertical);
-    else if (is_code(vertical_datum))
-        reference.vertical_datum = epsg(*vertical_datum);
-}
-
-Result<void> check_steps(const Georeference& reference, const std::string& path, const char* where) {
-    for (const double value : {reference.first_x, reference.first_y, reference.column_x, reference.column_y,
-                               reference.row_x, reference.row_y}) {
-        if (!std::isfinite(value))
-            return Error{ErrorCode::input,
-                         fmt::format("{}: {} holds {}, so the samples lie nowhere", path, where, value)};
-    }
-    const double area = reference.column_x * reference.row_y - reference.column_y * reference.row_x;
-    if (area == 0 || !std::isfinite(area))
-        return Error{
-            ErrorCode::input,
-            fmt::format("{}: {} gives steps of ({}, {}) and ({}, {}), so all samples would lie on one line", path,
-                        where, reference.column_x, reference.column_y, reference.row_x, reference.row_y)};
-    return {};
-}
 
 // x = a*column + b*row + c, y = d*column + e*row + f in the file's own raster space.
 struct Affine {
@@ -150,35 +69,62 @@ void apply(const Affine& t, double centre, Georeference& reference) {
     reference.first_y = t.f + centre * (t.d + t.e);
 }
 
-Result<void> read_transform(TIFF* file, const std::string& path, GeotiffTags& tags) {
-    std::uint16_t scale_count = 0;
-    std::uint16_t tie_count = 0;
-    std::uint16_t matrix_count = 0;
-    double* scale = nullptr;
-    double* tie = nullptr;
-    double* matrix = nullptr;
-    const bool has_scale = TIFFGetField(file, TIFFTAG_GEOPIXELSCALE, &scale_count, &scale) == 1 && scale_count >= 2;
-    const bool has_tie =
-        TIFFGetField(file, TIFFTAG_GEOTIEPOINTS, &tie_count, &tie) == 1 && tie_count >= kTiePointDoubles;
-    const bool has_matrix =
-        TIFFGetField(file, TIFFTAG_GEOTRANSMATRIX, &matrix_count, &matrix) == 1 && matrix_count >= 16;
-    const double centre = tags.reference.raster_is_point ? 0.0 : 0.5;
+struct Doubles {
+    std::uint16_t count = 0;
+    const double* values = nullptr;
+    double operator[](int i) const { return values[i]; }
+};
 
-    if (has_scale && has_tie) {
+// None where there are fewer than `least`.
+Doubles doubles_tag(TIFF* file, std::uint32_t tag, std::uint16_t least) {
+    Doubles read;
+    double* values = nullptr;
+    if (TIFFGetField(file, tag, &read.count, &values) != 1 || values == nullptr || read.count < least) return {};
+    read.values = values;
+    return read;
+}
+
+Result<void> read_transform(TIFF* file, const std::string& path, GeotiffTags& tags) {
+    const Doubles scale = doubles_tag(file, TIFFTAG_GEOPIXELSCALE, 2);
+    const Doubles tie = doubles_tag(file, TIFFTAG_GEOTIEPOINTS, kTiePointDoubles);
+    Doubles matrix = doubles_tag(file, TIFFTAG_GEOTRANSMATRIX, kMatrixDoubles);
+    // Intergraph wrote the same matrix, one double longer or not, before GeoTIFF had a tag for it.
+    if (matrix.count == 0) matrix = doubles_tag(file, TIFFTAG_INTERGRAPH_MATRIX, kMatrixDoubles);
+    const double centre = tags.reference.raster_is_point ? 0.0 : 0.5;
+    const int ties = tie.count / kTiePointDoubles;
+    // Some writers put zeros for a scale that they do not have.
+    const bool no_scale = scale.count == 0 || (scale[0] == 0 && scale[1] == 0 && (matrix.count > 0 || ties > 1));
+
+    if (!no_scale && ties > 0) {
         // A negative y scale is a writer's slip: the specification's y axis already points up, and such files are
         // north-up.
         const Affine t{
             scale[0], 0, tie[3] - tie[0] * scale[0], 0, -std::abs(scale[1]), tie[4] + tie[1] * std::abs(scale[1])};
         apply(t, centre, tags.reference);
         tags.has_transform = true;
-        return check_steps(tags.reference, path, "its ModelPixelScale and ModelTiepoint");
+        return check_place(tags.reference, path, "its ModelPixelScale and ModelTiepoint");
     }
-    if (has_matrix) {
+    if (matrix.count > 0) {
         apply({matrix[0], matrix[1], matrix[3], matrix[4], matrix[5], matrix[7]}, centre, tags.reference);
         tags.has_transform = true;
-        return check_steps(tags.reference, path, "its ModelTransformation");
+        return check_place(tags.reference, path, "its ModelTransformation");
     }
+    if (ties > 1) tags.control_points = ties;
     return {};
+}
+
+void read_keys(TIFF* file, Georeference& reference, bool& has_crs) {
+    const GtifHandle keys(GTIFNewEx(file, ignore_geotiff_message, nullptr));
+    if (!keys) return;
+    GeotiffCrs said = read_geotiff_crs(keys.get());
+    has_crs = said.said;
+    reference.crs = std::move(said.crs);
+    reference.crs_name = std::move(said.name);
+    reference.vertical_datum = std::move(said.vertical);
+    reference.height_unit_m = said.height_unit_m;
+    reference.geographic = said.geographic;
+    reference.linear_unit_m = said.linear_unit_m;
+    reference.raster_is_point = said.raster_is_point;
 }
 
 Result<GeotiffTags> read_geotiff_tags(const std::string& path) {
@@ -188,14 +134,19 @@ Result<GeotiffTags> read_geotiff_tags(const std::string& path) {
     if (!file.valid())
         return Error{ErrorCode::input,
                      fmt::format("{}: not a readable TIFF ({}), so it cannot be placed", path, file.messages())};
-    const GtifHandle keys(GTIFNewEx(file.get(), ignore_geotiff_message, nullptr));
-    if (keys) {
-        const auto raster_type = short_key(keys.get(), GTRasterTypeGeoKey);
-        tags.reference.raster_is_point = raster_type == RasterPixelIsPoint;
-        read_crs(keys.get(), tags);
+    read_keys(file.get(), tags.reference, tags.has_crs);
+    if (tags.reference.height_unit_m == 0) {
+        const std::string metadata = text_tag(file.get(), kGdalMetadataTag);
+        tags.reference.height_unit_m = length_unit_m(parse_gdal_metadata(metadata).unit);
     }
     if (Result<void> placed = read_transform(file.get(), path, tags); !placed) return placed.error();
     return tags;
+}
+
+Error only_control_points(const std::string& path, int count) {
+    return {ErrorCode::input,
+            fmt::format("{}: placed by {} ground control points, which give no grid; rectify it first (gdalwarp)", path,
+                        count)};
 }
 
 std::string with_case(std::string text, int (*change)(int)) {
@@ -249,8 +200,17 @@ Result<Georeference> parse_world_file(const std::string& path) {
     // The file's order is A D B E C F, and C F is already the centre of the upper-left sample.
     Georeference reference;
     apply({values[0], values[2], values[4], values[1], values[3], values[5]}, 0.0, reference);
-    if (Result<void> checked = check_steps(reference, path, "the world file"); !checked) return checked.error();
+    if (Result<void> checked = check_place(reference, path, "the world file"); !checked) return checked.error();
     return reference;
+}
+
+void take_place(const Georeference& from, Georeference& to) {
+    to.first_x = from.first_x;
+    to.first_y = from.first_y;
+    to.column_x = from.column_x;
+    to.column_y = from.column_y;
+    to.row_x = from.row_x;
+    to.row_y = from.row_y;
 }
 
 }  // namespace
@@ -260,10 +220,26 @@ bool Georeference::axis_aligned() const {
            std::abs(column_y) <= kNegligibleRotation * std::abs(row_y);
 }
 
+Result<void> check_place(const Georeference& place, const std::string& path, const char* where) {
+    for (const double value :
+         {place.first_x, place.first_y, place.column_x, place.column_y, place.row_x, place.row_y}) {
+        if (!(std::abs(value) <= kFarthest))
+            return Error{ErrorCode::input,
+                         fmt::format("{}: {} holds {}, so the samples lie nowhere", path, where, value)};
+    }
+    const double area = place.column_x * place.row_y - place.column_y * place.row_x;
+    if (area == 0 || !std::isfinite(area))
+        return Error{ErrorCode::input,
+                     fmt::format("{}: {} gives steps of ({}, {}) and ({}, {}), so all samples would lie on one line",
+                                 path, where, place.column_x, place.column_y, place.row_x, place.row_y)};
+    return {};
+}
+
 Result<std::optional<Georeference>> read_geotiff(const std::string& path) {
     try {
         Result<GeotiffTags> tags = read_geotiff_tags(path);
         if (!tags) return tags.error();
+        if (tags->control_points > 0) return only_control_points(path, tags->control_points);
         if (!tags->has_transform) return std::optional<Georeference>{};
         return std::optional<Georeference>(std::move(tags->reference));
     } catch (const std::exception& problem) {
@@ -291,18 +267,18 @@ Result<std::optional<Georeference>> read_georeference(const std::string& image_p
     try {
         Result<GeotiffTags> tags = read_geotiff_tags(image_path);
         if (!tags) return tags.error();
-        if (tags->has_transform) return std::optional<Georeference>(std::move(tags->reference));
-        Result<std::optional<Georeference>> world = read_world_file(image_path);
-        if (!world || !world->has_value() || !tags->has_crs) return world;
-        const Georeference& placed = **world;
-        Georeference merged = std::move(tags->reference);
-        merged.first_x = placed.first_x;
-        merged.first_y = placed.first_y;
-        merged.column_x = placed.column_x;
-        merged.column_y = placed.column_y;
-        merged.row_x = placed.row_x;
-        merged.row_y = placed.row_y;
-        return std::optional<Georeference>(std::move(merged));
+        Georeference reference = std::move(tags->reference);
+        if (!tags->has_transform) {
+            const Result<std::optional<Georeference>> world = read_world_file(image_path);
+            if (!world) return world.error();
+            if (!world->has_value()) {
+                if (tags->control_points > 0) return only_control_points(image_path, tags->control_points);
+                return std::optional<Georeference>{};
+            }
+            take_place(**world, reference);
+        }
+        if (auto taken = take_projection_file(image_path, reference); !taken) return taken.error();
+        return std::optional<Georeference>(std::move(reference));
     } catch (const std::exception& problem) {
         return Error{ErrorCode::input,
                      fmt::format("{}: its georeference cannot be read ({})", image_path, problem.what())};

@@ -30,15 +30,21 @@ struct Georeference {
     bool axis_aligned() const;
 };
 
-/// Reads GeoTIFF tags of a TIFF file; nullopt when it has none. Errors (ErrorCode::input) only for absurd values
-/// (NaN, infinite, zero step).
+/// Numbers that place samples: none beyond 1e15, and samples not all on one line. Errors: ErrorCode::input; `where` is
+/// what holds them.
+Result<void> check_place(const Georeference& place, const std::string& path, const char* where);
+
+/// Reads GeoTIFF tags of a TIFF file; nullopt when it has none. A place is given by ModelPixelScale and the first
+/// ModelTiepoint, else by a ModelTransformation (or Intergraph's tag of the same content). Errors (ErrorCode::input)
+/// only for absurd values (NaN, infinite, zero step) and for a file that only ground control points place.
 Result<std::optional<Georeference>> read_geotiff(const std::string& path);
 
 /// Reads PATH's world file (.tfw .pgw .jgw .wld, also .tifw-style double extension, either case) when there is one.
 Result<std::optional<Georeference>> read_world_file(const std::string& image_path);
 
 /// What places an image: its GeoTIFF tags, else its world file. A TIFF with CRS keys but no transformation takes the
-/// transformation from its world file and keeps the CRS of its keys.
+/// transformation from its world file and keeps the CRS of its keys. Where there are none, the CRS is that of a .prj
+/// file (projection_file.h).
 Result<std::optional<Georeference>> read_georeference(const std::string& image_path);
 
 }  // namespace scree

@@ -17,6 +17,7 @@
 #include <fmt/format.h>
 #include <tiffio.h>
 
+#include "tools/source/gdal_metadata.h"
 #include "tools/source/number_text.h"
 #include "tools/source/tiff_file.h"
 
@@ -25,8 +26,10 @@ namespace {
 
 constexpr std::int64_t kMaxSide = std::int64_t{1} << 30;  // the lattice has no more cells a side
 constexpr int kMaxChannels = 1024;
+constexpr std::uint32_t kGdalMetadataTag = 42112;
 constexpr std::uint32_t kGdalNodataTag = 42113;
 constexpr std::size_t kSniffBytes = 64;
+constexpr int kMaxDirectories = 256;  // of a TIFF, searched for a mask; more are pages of something else
 
 Error unusable(const std::string& path, const std::string& what) {
     return {ErrorCode::input, fmt::format("{}: {}", path, what)};
@@ -69,72 +72,159 @@ std::optional<SampleType> whole_byte_type(int bits, int format) {
     }
 }
 
-Result<void> check_tiff_layout(const std::string& path, TIFF* file, ImageHeader& header) {
+// The smallest type that holds integers of odd widths.
+SampleType type_holding(int bits, bool is_signed) {
+    if (bits <= 8) return is_signed ? SampleType::i8 : SampleType::u8;
+    if (bits <= 16) return is_signed ? SampleType::i16 : SampleType::u16;
+    return is_signed ? SampleType::i32 : SampleType::u32;
+}
+
+struct TiffLayout {
     std::uint16_t bits = 1;
     std::uint16_t samples = 1;
     std::uint16_t format = SAMPLEFORMAT_UINT;
     std::uint16_t photometric = PHOTOMETRIC_MINISBLACK;
     std::uint16_t compression = COMPRESSION_NONE;
+    std::uint16_t planes = PLANARCONFIG_CONTIG;
+    std::uint16_t ink_set = INKSET_CMYK;
     std::uint32_t depth = 1;
-    TIFFGetFieldDefaulted(file, TIFFTAG_BITSPERSAMPLE, &bits);
-    TIFFGetFieldDefaulted(file, TIFFTAG_SAMPLESPERPIXEL, &samples);
-    TIFFGetFieldDefaulted(file, TIFFTAG_SAMPLEFORMAT, &format);
-    TIFFGetField(file, TIFFTAG_PHOTOMETRIC, &photometric);
-    TIFFGetFieldDefaulted(file, TIFFTAG_COMPRESSION, &compression);
-    TIFFGetFieldDefaulted(file, TIFFTAG_IMAGEDEPTH, &depth);
+    std::uint32_t tile_width = 0;
+};
 
-    if (depth > 1) return unusable(path, fmt::format("it is a volume of {} slices; only flat images are read", depth));
-    if (format == SAMPLEFORMAT_COMPLEXIEEEFP || format == SAMPLEFORMAT_COMPLEXINT)
+TiffLayout tiff_layout(TIFF* file) {
+    TiffLayout layout;
+    TIFFGetFieldDefaulted(file, TIFFTAG_BITSPERSAMPLE, &layout.bits);
+    TIFFGetFieldDefaulted(file, TIFFTAG_SAMPLESPERPIXEL, &layout.samples);
+    TIFFGetFieldDefaulted(file, TIFFTAG_SAMPLEFORMAT, &layout.format);
+    TIFFGetField(file, TIFFTAG_PHOTOMETRIC, &layout.photometric);
+    TIFFGetFieldDefaulted(file, TIFFTAG_COMPRESSION, &layout.compression);
+    TIFFGetFieldDefaulted(file, TIFFTAG_PLANARCONFIG, &layout.planes);
+    TIFFGetFieldDefaulted(file, TIFFTAG_INKSET, &layout.ink_set);
+    TIFFGetFieldDefaulted(file, TIFFTAG_IMAGEDEPTH, &layout.depth);
+    if (TIFFIsTiled(file) != 0) TIFFGetField(file, TIFFTAG_TILEWIDTH, &layout.tile_width);
+    return layout;
+}
+
+Result<void> check_tiff_samples(const std::string& path, const TiffLayout& layout) {
+    if (layout.depth > 1)
+        return unusable(path, fmt::format("it is a volume of {} slices; only flat images are read", layout.depth));
+    if (layout.format == SAMPLEFORMAT_COMPLEXIEEEFP || layout.format == SAMPLEFORMAT_COMPLEXINT)
         return unusable(path, "its samples are complex numbers, which are neither heights nor colours");
-    const bool is_float = format == SAMPLEFORMAT_IEEEFP;
+    const int bits = layout.bits;
+    const bool is_float = layout.format == SAMPLEFORMAT_IEEEFP;
     if (is_float ? bits != 16 && bits != 32 && bits != 64 : bits == 0 || (bits > 32 && bits != 64))
         return unusable(
             path,
             fmt::format(
                 "its samples are {}-bit {}; integers of 1 to 32 and 64 bits and floats of 16, 32 and 64 bits are read",
                 bits, is_float ? "floats" : "integers"));
-    if (photometric == PHOTOMETRIC_SEPARATED || photometric == PHOTOMETRIC_CIELAB ||
-        photometric == PHOTOMETRIC_ICCLAB || photometric == PHOTOMETRIC_ITULAB || photometric == PHOTOMETRIC_LOGL ||
-        photometric == PHOTOMETRIC_LOGLUV)
-        return unusable(path, fmt::format("its colours are {} (photometric {}); convert it to RGB or grey first",
-                                          photometric == PHOTOMETRIC_SEPARATED ? "CMYK" : "Lab or Luv", photometric));
-    if (samples == 0 || samples > kMaxChannels)
-        return unusable(path, fmt::format("its header says {} channels; 1 to {} can be read", samples, kMaxChannels));
-    const std::optional<SampleType> type = whole_byte_type(bits, format);
-    if (type && (photometric == PHOTOMETRIC_MINISBLACK || photometric == PHOTOMETRIC_RGB)) {
-        std::uint16_t planes = PLANARCONFIG_CONTIG;
-        std::uint32_t tile_width = 0;
-        TIFFGetFieldDefaulted(file, TIFFTAG_PLANARCONFIG, &planes);
-        if (TIFFIsTiled(file) != 0) TIFFGetField(file, TIFFTAG_TILEWIDTH, &tile_width);
-        header.plain_tiff = PlainTiff{*type, samples, planes == PLANARCONFIG_SEPARATE && samples > 1, tile_width};
-    } else if (bits == 64 && !is_float) {
-        return unusable(
-            path, fmt::format("its samples are 64-bit integers of photometric {}; only grey and RGB ones are read",
-                              photometric));
-    } else if (!type && photometric != PHOTOMETRIC_PALETTE) {
-        header.significant_bits = bits;
-    }
-    header.inverted_by_decoder =
-        !header.plain_tiff && photometric == PHOTOMETRIC_MINISWHITE && bits <= 8 && format == SAMPLEFORMAT_UINT;
-
-    std::uint16_t extra_count = 0;
-    std::uint16_t* extra = nullptr;
-    if (TIFFGetField(file, TIFFTAG_EXTRASAMPLES, &extra_count, &extra) == 1) {
-        for (int i = 0; i < extra_count && header.alpha_channel < 0; ++i) {
-            if (extra[i] != EXTRASAMPLE_ASSOCALPHA && extra[i] != EXTRASAMPLE_UNASSALPHA) continue;
-            header.alpha_channel = samples - extra_count + i;
-            header.associated_alpha = extra[i] == EXTRASAMPLE_ASSOCALPHA;
-        }
-    }
-    // Such colours are decoded by libtiff's whole-image RGBA interface.
-    if (photometric == PHOTOMETRIC_YCBCR && compression != COMPRESSION_JPEG) header.rows_per_strip = header.height;
+    if (layout.samples == 0 || layout.samples > kMaxChannels)
+        return unusable(path,
+                        fmt::format("its header says {} channels; 1 to {} can be read", layout.samples, kMaxChannels));
     return {};
 }
 
-Result<void> read_tiff_header(const std::string& path, ImageHeader& header) {
-    TiffFile tiff(path, "rm");
-    if (!tiff.valid()) return unusable(path, fmt::format("not a readable TIFF ({})", tiff.messages()));
-    TIFF* file = tiff.get();
+Result<void> read_tiff_palette(const std::string& path, TIFF* file, const TiffLayout& layout, ImageHeader& header) {
+    std::uint16_t* channels[3] = {};
+    if (layout.bits > 16 || layout.format == SAMPLEFORMAT_INT || layout.format == SAMPLEFORMAT_IEEEFP)
+        return unusable(path, fmt::format("its samples of {} bits cannot be indices of a palette", layout.bits));
+    if (TIFFGetField(file, TIFFTAG_COLORMAP, &channels[0], &channels[1], &channels[2]) != 1)
+        return unusable(path, "it needs a palette but has none, so its colours are unknown");
+    const std::size_t count = std::size_t{1} << layout.bits;
+    // Some writers stored 8-bit entries where the format means 16-bit ones.
+    bool narrow = true;
+    for (const std::uint16_t* channel : channels)
+        narrow = narrow && std::all_of(channel, channel + count, [](std::uint16_t v) { return v < 256; });
+    header.model = ColourModel::palette;
+    header.palette.assign(count, {0, 0, 0, 255});
+    for (std::size_t i = 0; i < count; ++i)
+        for (std::size_t c = 0; c < 3; ++c)
+            header.palette[i][c] = static_cast<std::uint8_t>(narrow ? channels[c][i] : channels[c][i] >> 8);
+    header.values_are_colours = true;
+    return {};
+}
+
+// Sets what the channels mean; false in rgba_by_libtiff means that the samples are taken as they are stored.
+Result<void> read_tiff_colours(const std::string& path, TIFF* file, const TiffLayout& layout, ImageHeader& header) {
+    PlainTiff& plain = *header.plain_tiff;
+    switch (layout.photometric) {
+        case PHOTOMETRIC_MINISWHITE:
+            header.min_is_white = true;
+            return {};
+        case PHOTOMETRIC_MINISBLACK:
+        case PHOTOMETRIC_RGB:
+        case PHOTOMETRIC_MASK:
+            return {};
+        case PHOTOMETRIC_PALETTE:
+            return read_tiff_palette(path, file, layout, header);
+        case PHOTOMETRIC_SEPARATED:
+            if (layout.ink_set != INKSET_CMYK || layout.samples < 4)
+                return unusable(path, fmt::format("its colours are {} inks other than CMYK; convert it to RGB first",
+                                                  layout.samples));
+            header.model = ColourModel::cmyk;
+            header.values_are_colours = true;
+            return {};
+        case PHOTOMETRIC_YCBCR:
+        case PHOTOMETRIC_CIELAB: {
+            header.values_are_colours = true;
+            if (layout.photometric == PHOTOMETRIC_YCBCR && layout.compression == COMPRESSION_JPEG && layout.bits == 8 &&
+                layout.samples == 3 && layout.planes == PLANARCONFIG_CONTIG) {
+                plain.ycbcr_jpeg = true;
+                return {};
+            }
+            char reason[1024] = {};
+            if (layout.bits != 8 || TIFFRGBAImageOK(file, reason) == 0)
+                return unusable(path, fmt::format("its colours of photometric {} and {} bits cannot be made RGB ({}); "
+                                                  "convert it to RGB or grey first",
+                                                  layout.photometric, layout.bits,
+                                                  reason[0] != 0 ? reason : "only 8-bit ones can"));
+            plain.rgba_by_libtiff = true;
+            plain.separate_planes = false;
+            plain.type = SampleType::u8;
+            plain.channels = 4;
+            return {};
+        }
+        default:
+            return unusable(path, fmt::format("its colours are of photometric {}, which is not read (grey, RGB, "
+                                              "palette, CMYK, YCbCr and CIE Lab are); convert it to RGB or grey first",
+                                              layout.photometric));
+    }
+}
+
+void read_tiff_alpha(TIFF* file, int samples, ImageHeader& header) {
+    std::uint16_t count = 0;
+    std::uint16_t* extra = nullptr;
+    if (TIFFGetField(file, TIFFTAG_EXTRASAMPLES, &count, &extra) == 1) {
+        for (int i = std::max(0, count - samples); i < count && header.alpha_channel < 0; ++i) {
+            if (extra[i] != EXTRASAMPLE_ASSOCALPHA && extra[i] != EXTRASAMPLE_UNASSALPHA) continue;
+            header.alpha_channel = samples - count + i;
+            header.associated_alpha = extra[i] == EXTRASAMPLE_ASSOCALPHA;
+        }
+    }
+    if (header.plain_tiff->rgba_by_libtiff) {
+        header.associated_alpha = header.alpha_channel >= 0;  // libtiff multiplies by either kind
+        header.alpha_channel = 3;
+    }
+}
+
+Result<void> read_tiff_layout(const std::string& path, TIFF* file, ImageHeader& header) {
+    const TiffLayout layout = tiff_layout(file);
+    if (Result<void> checked = check_tiff_samples(path, layout); !checked) return checked;
+    const std::optional<SampleType> whole = whole_byte_type(layout.bits, layout.format);
+    PlainTiff plain;
+    plain.type = whole ? *whole : type_holding(layout.bits, layout.format == SAMPLEFORMAT_INT);
+    plain.bits = layout.bits;
+    plain.channels = layout.samples;
+    plain.separate_planes = layout.planes == PLANARCONFIG_SEPARATE && layout.samples > 1;
+    plain.tile_width = layout.tile_width;
+    header.plain_tiff = plain;
+    if (!whole) header.significant_bits = layout.bits;
+    if (Result<void> colours = read_tiff_colours(path, file, layout, header); !colours) return colours;
+    read_tiff_alpha(file, layout.samples, header);
+    return {};
+}
+
+Result<void> read_tiff_directory(const std::string& path, TIFF* file, ImageHeader& header) {
     std::uint32_t width = 0;
     std::uint32_t height = 0;
     TIFFGetField(file, TIFFTAG_IMAGEWIDTH, &width);
@@ -158,18 +248,38 @@ Result<void> read_tiff_header(const std::string& path, ImageHeader& header) {
         if (rows == 0) return unusable(path, "the header says strips of 0 rows, which cannot be read");
         header.rows_per_strip = std::min<std::int64_t>(rows, height);
     }
+    return read_tiff_layout(path, file, header);
+}
 
-    if (const TIFFField* field = TIFFFindField(file, kGdalNodataTag, TIFF_ASCII)) {
-        const char* text = nullptr;
-        if (TIFFFieldPassCount(field) != 0) {
-            std::uint32_t count = 0;
-            if (TIFFGetField(file, kGdalNodataTag, &count, &text) == 1 && text != nullptr)
-                header.nodata = std::string(text, count);
-        } else if (TIFFGetField(file, kGdalNodataTag, &text) == 1 && text != nullptr) {
-            header.nodata = text;
-        }
-    }
-    return check_tiff_layout(path, file, header);
+void read_gdal_tags(TIFF* file, ImageHeader& header) {
+    if (const std::string nodata = text_tag(file, kGdalNodataTag); !nodata.empty()) header.nodata = nodata;
+    const GdalBandMetadata band = parse_gdal_metadata(text_tag(file, kGdalMetadataTag));
+    header.value_scale = band.scale;
+    header.value_offset = band.offset;
+}
+
+Result<void> read_tiff_header(const std::string& path, ImageHeader& header) {
+    TiffFile tiff(path, "rm");
+    if (!tiff.valid()) return unusable(path, fmt::format("not a readable TIFF ({})", tiff.messages()));
+    read_gdal_tags(tiff.get(), header);
+    return read_tiff_directory(path, tiff.get(), header);
+}
+
+bool is_mask_of(TIFF* file, const ImageHeader& image) {
+    std::uint32_t kind = 0;
+    std::uint32_t width = 0;
+    std::uint32_t height = 0;
+    std::uint16_t samples = 1;
+    std::uint16_t bits = 1;
+    TIFFGetField(file, TIFFTAG_SUBFILETYPE, &kind);
+    TIFFGetField(file, TIFFTAG_IMAGEWIDTH, &width);
+    TIFFGetField(file, TIFFTAG_IMAGELENGTH, &height);
+    TIFFGetFieldDefaulted(file, TIFFTAG_SAMPLESPERPIXEL, &samples);
+    TIFFGetFieldDefaulted(file, TIFFTAG_BITSPERSAMPLE, &bits);
+    // With the bit of reduced images it masks an overview.
+    return (kind & FILETYPE_MASK) != 0 && (kind & FILETYPE_REDUCEDIMAGE) == 0 && width == image.width &&
+           height == image.height && (bits == 1 || bits == 8) &&
+           (samples == 1 || samples == image.plain_tiff->channels);
 }
 
 Result<void> read_png_header(const std::string& path, std::string_view start, ImageHeader& header) {
@@ -179,9 +289,10 @@ Result<void> read_png_header(const std::string& path, std::string_view start, Im
     header.width = big_endian(bytes + 16, 4);
     header.height = big_endian(bytes + 20, 4);
     header.rows_per_strip = bytes[28] != 0 ? header.height : 1;
-    const int bits = bytes[24];
-    const bool grey = bytes[25] == 0 || bytes[25] == 4;
-    if (grey && bits < 8) header.significant_bits = bits;
+    const int depth = bytes[24];
+    const int colour_type = bytes[25];
+    header.values_are_colours = colour_type == 3;
+    if (colour_type == 0 && depth < 8) header.spread_bits = depth;
     return check_sides(path, header.width, header.height);
 }
 
@@ -210,6 +321,8 @@ Result<void> read_jpeg_header(const std::string& path, ImageHeader& header) {
     const auto read = [&](std::size_t count) {
         return static_cast<bool>(file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(count)));
     };
+    bool adobe = false;
+    int components = 0;
     while (read(2)) {
         if (bytes[0] != 0xFF)
             return unusable(path, fmt::format("found byte {:#04x} where the JPEG needs a marker", bytes[0]));
@@ -222,6 +335,10 @@ Result<void> read_jpeg_header(const std::string& path, ImageHeader& header) {
         if (length < 2) return unusable(path, fmt::format("JPEG marker {:#04x} claims a length of {}", marker, length));
         if (marker == 0xDA) {
             if (header.width == 0) break;
+            if (components == 4 && !adobe)
+                return unusable(path,
+                                "it has four components but no Adobe marker that says what they mean; convert it "
+                                "to RGB or grey first");
             file.seekg(length - 2, std::ios::cur);
             if (!jpeg_has_end(file))
                 return unusable(path, "the JPEG is cut off: its end marker is missing, so rows are lost");
@@ -234,8 +351,15 @@ Result<void> read_jpeg_header(const std::string& path, ImageHeader& header) {
             skip -= 6;
             header.height = big_endian(bytes.data() + 1, 2);
             header.width = big_endian(bytes.data() + 3, 2);
-            if (bytes[5] == 4) return unusable(path, "its colours are CMYK; convert it to RGB or grey first");
+            components = bytes[5];
+            header.values_are_colours = components != 1;
             header.rows_per_strip = marker == 0xC0 || marker == 0xC1 ? 1 : header.height;
+        }
+        if (marker == 0xEE && skip >= 5) {
+            if (!read(5)) break;
+            skip -= 5;
+            // The marker stands for inks stored inverted, which is how the decoder takes them.
+            adobe = adobe || std::memcmp(bytes.data(), "Adobe", 5) == 0;
         }
         file.seekg(skip, std::ios::cur);
     }
@@ -249,23 +373,38 @@ Result<void> read_jpeg2000_header(const std::string& path, ImageHeader& header) 
     file.read(start.data(), static_cast<std::streamsize>(start.size()));
     const std::string_view text(start.data(), static_cast<std::size_t>(file.gcount()));
     const std::size_t siz = text.find(std::string_view("\xFF\x4F\xFF\x51", 4));
-    if (siz == std::string_view::npos || text.size() - siz < 24)
+    if (siz == std::string_view::npos || text.size() - siz < 45)
         return unusable(path, "the JPEG 2000 file has no codestream header in its first 64 KiB");
     const auto* bytes = reinterpret_cast<const unsigned char*>(text.data()) + siz;
     header.width = std::int64_t{big_endian(bytes + 8, 4)} - big_endian(bytes + 16, 4);
     header.height = std::int64_t{big_endian(bytes + 12, 4)} - big_endian(bytes + 20, 4);
     header.rows_per_strip = header.height;
-    // Of the first component: bit depth - 1, and whether it is signed.
-    if (text.size() - siz < 43) return unusable(path, "the JPEG 2000 file ends within its codestream header");
+    // Ssiz of every component: its sign in the highest bit, its depth less 1 in the others.
+    const std::uint32_t components = big_endian(bytes + 40, 2);
+    for (std::size_t c = 0; c < components && siz + 42 + 3 * c < text.size(); ++c) {
+        const unsigned depth = bytes[42 + 3 * c];
+        if ((depth & 0x80) != 0)
+            return unusable(path, "its samples are signed, which its decoder misreads; store it as a GeoTIFF");
+        if (depth != bytes[42])
+            return unusable(path, "its bands differ in depth, which its decoder mixes up; store it as a GeoTIFF");
+    }
     const int bits = (bytes[42] & 0x7F) + 1;
-    if ((bytes[42] & 0x80) != 0)
-        return unusable(path,
-                        fmt::format("its samples are signed {}-bit integers, which are not read from JPEG 2000", bits));
     if (bits > 16)
         return unusable(path,
                         fmt::format("its samples are {}-bit integers; of JPEG 2000 up to 16 bits are read", bits));
-    if (bits != 8 && bits != 16) header.significant_bits = bits;
+    header.spread_bits = bits % 8 == 0 ? 0 : bits;
     return check_sides(path, header.width, header.height);
+}
+
+Result<void> read_bmp_header(const std::string& path, std::string_view start, ImageHeader& header) {
+    const auto* bytes = reinterpret_cast<const unsigned char*>(start.data());
+    if (start.size() < 34) return unusable(path, "the BMP ends within its header");
+    const bool has_compression = bytes[14] >= 40;  // the first field of the second header is its size
+    const unsigned compression = has_compression ? bytes[30] : 0u;
+    if (compression == 1 || compression == 2)
+        return unusable(path, "its pixels are run-length encoded, which its decoder misreads; store it uncompressed");
+    header.values_are_colours = bytes[has_compression ? 28 : 24] <= 8;  // bits a pixel: indices of a palette
+    return {};
 }
 
 std::optional<ImageKind> kind_of(std::string_view start, const std::string& path) {
@@ -352,7 +491,9 @@ Result<ImageHeader> read_image_header(const std::string& path) {
     const std::optional<ImageKind> kind = kind_of(start, path);
     if (!kind) {
         return unusable(
-            path, "not an image of a known kind (TIFF, PNG, JPEG, JPEG 2000, OpenEXR, BMP, PNM, WebP, Targa, HDR)");
+            path,
+            "not an image of a known kind (TIFF, PNG, JPEG, JPEG 2000, OpenEXR, BMP, PNM, WebP, Targa, HDR) nor a DEM "
+            "of one (SRTM .hgt, DTED, ESRI ASCII grid, BIL, BIP, BSQ, GridFloat, ENVI, USGS DEM)");
     }
     ImageHeader header;
     header.kind = *kind;
@@ -379,6 +520,8 @@ Result<ImageHeader> read_image_header(const std::string& path) {
             header.rows_per_strip = std::numeric_limits<std::int64_t>::max();
             break;  // whole frame
         case ImageKind::bmp:
+            read = read_bmp_header(path, start, header);
+            break;
         case ImageKind::hdr:
             break;
     }
@@ -386,32 +529,57 @@ Result<ImageHeader> read_image_header(const std::string& path) {
     return header;
 }
 
+Result<std::optional<ImageHeader>> read_mask_header(const std::string& path, const ImageHeader& image) {
+    std::optional<ImageHeader> none;
+    if (image.kind != ImageKind::tiff) return none;
+    // Offsets of strips are not wanted here: a large file's overviews have many.
+    TiffFile tiff(path, "rmD");
+    if (!tiff.valid()) return none;
+    // A damaged later directory ends the search: the image itself has been checked.
+    for (int i = 1; i < kMaxDirectories && TIFFReadDirectory(tiff.get()) == 1; ++i) {
+        if (!is_mask_of(tiff.get(), image)) continue;
+        ImageHeader mask;
+        mask.kind = ImageKind::tiff;
+        if (Result<void> read = read_tiff_directory(path, tiff.get(), mask); !read) return read.error();
+        mask.plain_tiff->directory = TIFFCurrentDirOffset(tiff.get());
+        return std::optional(std::move(mask));
+    }
+    return none;
+}
+
 std::optional<double> nodata_as(SampleType type, const std::string& text) {
+    // What one C library printed for infinities.
+    if (text.find("1.#INF") != std::string::npos)
+        return nodata_as(type,
+                         (text.find('-') != std::string::npos ? -1 : 1) * std::numeric_limits<double>::infinity());
     const std::optional<double> value = parse_number(text);
-    if (!value) return std::nullopt;
+    return value ? nodata_as(type, *value) : std::nullopt;
+}
+
+std::optional<double> nodata_as(SampleType type, double value) {
     switch (type) {
         case SampleType::u8:
-            return as_integer<std::uint8_t>(*value);
+            return as_integer<std::uint8_t>(value);
         case SampleType::i8:
-            return as_integer<std::int8_t>(*value);
+            return as_integer<std::int8_t>(value);
         case SampleType::u16:
-            return as_integer<std::uint16_t>(*value);
+            return as_integer<std::uint16_t>(value);
         case SampleType::i16:
-            return as_integer<std::int16_t>(*value);
+            return as_integer<std::int16_t>(value);
         case SampleType::u32:
-            return as_integer<std::uint32_t>(*value);
+            return as_integer<std::uint32_t>(value);
         case SampleType::i32:
-            return as_integer<std::int32_t>(*value);
+            return as_integer<std::int32_t>(value);
         case SampleType::u64:
-            return as_integer<std::uint64_t>(*value);
+            return as_integer<std::uint64_t>(value);
         case SampleType::i64:
-            return as_integer<std::int64_t>(*value);
+            return as_integer<std::int64_t>(value);
         case SampleType::f16:
-            return static_cast<double>(static_cast<float>(half(static_cast<float>(as_float(*value)))));
+            return static_cast<double>(static_cast<float>(half(static_cast<float>(as_float(value)))));
         case SampleType::f32:
-            return as_float(*value);
+            return as_float(value);
         case SampleType::f64:
-            return *value;
+            return value;
     }
     return std::nullopt;
 }

@@ -13,9 +13,12 @@
 
 #include <fmt/format.h>
 
+#include "tools/source/colour_rows.h"
+#include "tools/source/grid_file.h"
 #include "tools/source/image_header.h"
 #include "tools/source/isolated_decoder.h"
 #include "tools/source/pixel_decoder.h"
+#include "tools/source/sample_memory.h"
 
 namespace scree {
 namespace {
@@ -31,96 +34,123 @@ Error unusable(const std::string& path, const std::string& what) {
     return {ErrorCode::input, fmt::format("{}: {}", path, what)};
 }
 
-// Calls visit with a value of the type that decoded samples of `type` have in memory (half is widened to float).
-template <class Visit>
-void with_memory_type(SampleType type, Visit&& visit) {
-    switch (type) {
-        case SampleType::u8:
-            return visit(std::uint8_t{});
-        case SampleType::i8:
-            return visit(std::int8_t{});
-        case SampleType::u16:
-            return visit(std::uint16_t{});
-        case SampleType::i16:
-            return visit(std::int16_t{});
-        case SampleType::u32:
-            return visit(std::uint32_t{});
-        case SampleType::i32:
-            return visit(std::int32_t{});
-        case SampleType::u64:
-            return visit(std::uint64_t{});
-        case SampleType::i64:
-            return visit(std::int64_t{});
-        case SampleType::f16:
-        case SampleType::f32:
-            return visit(float{});
-        case SampleType::f64:
-            return visit(double{});
-    }
-}
-
 std::int64_t saturating_product(std::int64_t a, std::int64_t b) {
     std::int64_t product = 0;
     return __builtin_mul_overflow(a, b, &product) ? std::numeric_limits<std::int64_t>::max() : product;
 }
 
-template <class T>
-std::uint8_t to_byte(T value) {
-    if constexpr (std::is_same_v<T, std::uint8_t>) {
-        return value;
-    } else if constexpr (std::is_floating_point_v<T>) {
-        if (!(value > 0)) return 0;  // NaN too
-        return static_cast<std::uint8_t>(std::min<T>(value, 1) * 255 + T(0.5));
-    } else {
-        if (value <= 0) return 0;
-        return static_cast<std::uint8_t>(
-            static_cast<double>(value) * 255 / static_cast<double>(std::numeric_limits<T>::max()) + 0.5);
-    }
-}
-
-std::uint8_t divided_by_alpha(std::uint8_t colour, std::uint8_t alpha) {
-    if (alpha == 0) return colour;
-    return static_cast<std::uint8_t>(std::min(255, (colour * 255 + alpha / 2) / alpha));
-}
-
-class DecodedSource final : public ImageSource {
+// The rows of one decoder, a band at a time.
+class BandRows {
 public:
-    DecodedSource(std::string path, const ImageHeader& header, std::unique_ptr<IsolatedDecoder> decoder)
-        : path_(std::move(path)), header_(header), decoder_(std::move(decoder)) {}
+    explicit BandRows(std::unique_ptr<BandDecoder> decoder) : decoder_(std::move(decoder)) {}
 
-    Result<void> prepare(const OpenOptions& options) {
+    const DecodedLayout& layout() const { return decoder_->layout(); }
+    std::int64_t unit_rows() const { return unit_rows_; }
+    std::int64_t unit_bytes() const { return saturating_product(row_bytes_, unit_rows_); }
+
+    Result<void> prepare(const std::string& path, std::int64_t rows_per_strip, std::int64_t max_unit_bytes) {
         const DecodedLayout& layout = decoder_->layout();
         if (layout.channels <= 0 || layout.channels > kMaxChannels)
             return unusable(
-                path_, fmt::format("its header says {} channels; 1 to {} can be read", layout.channels, kMaxChannels));
+                path, fmt::format("its header says {} channels; 1 to {} can be read", layout.channels, kMaxChannels));
+        const bool tiled = layout.tile_rows > 0;
+        row_bytes_ = layout.width * layout.channels * static_cast<std::int64_t>(memory_bytes(layout.type));
+        unit_rows_ = std::min(layout.height, tiled ? layout.tile_rows : rows_per_strip);
+        if (unit_bytes() > max_unit_bytes) {
+            const std::int64_t needed_mib = unit_bytes() / kMiB + 1;
+            const char* unit = tiled ? "a row of tiles" : unit_rows_ == layout.height ? "the whole image" : "a strip";
+            return unusable(
+                path,
+                fmt::format("{} must be decoded at once: {} rows of {} bytes, {} MiB, but {} MiB may be held; give "
+                            "--memory at least {} MiB for it, or store the file in smaller strips or tiles",
+                            unit, unit_rows_, row_bytes_, needed_mib, max_unit_bytes / kMiB, needed_mib));
+        }
+        // A band starts at a unit's first row; small units are grouped.
+        const std::int64_t target = std::min(kBandTargetBytes, max_unit_bytes);
+        band_rows_ = unit_rows_ * std::max<std::int64_t>(1, target / std::max<std::int64_t>(unit_bytes(), 1));
+        return {};
+    }
+
+    /// The row's samples, until another row is asked for. The Error holds rows and reason.
+    Result<const std::byte*> row(std::int64_t row) {
+        if (row < band_begin_ || row >= band_end_) {
+            if (Result<void> loaded = load_band(row - row % band_rows_); !loaded) return loaded.error();
+        }
+        return band_ + (row - band_begin_) * row_bytes_;
+    }
+
+private:
+    Result<void> load_band(std::int64_t begin) {
+        const std::int64_t end = std::min(begin + band_rows_, layout().height);
+        band_begin_ = band_end_ = 0;  // a failure leaves nothing that could be taken for pixels
+        const Result<const std::byte*> decoded = decoder_->decode(begin, end);
+        if (!decoded) {
+            if (decoded.error().code != ErrorCode::input) return decoded.error();
+            return unreadable(begin, end, decoded.error().message);
+        }
+        band_ = *decoded;
+        band_begin_ = begin;
+        band_end_ = end;
+        return {};
+    }
+
+    Error unreadable(std::int64_t begin, std::int64_t end, const std::string& reason) const {
+        return {ErrorCode::input,
+                fmt::format("rows {} to {} of {} cannot be decoded ({}); the file is damaged or cut off", begin,
+                            end - 1, layout().height, reason)};
+    }
+
+    std::unique_ptr<BandDecoder> decoder_;
+    std::int64_t row_bytes_ = 0;
+    std::int64_t unit_rows_ = 1;
+    std::int64_t band_rows_ = 1;
+    const std::byte* band_ = nullptr;  ///< the decoder's: rows [band_begin_, band_end_), all channels, as decoded
+    std::int64_t band_begin_ = 0;
+    std::int64_t band_end_ = 0;
+};
+
+class DecodedSource final : public ImageSource {
+public:
+    DecodedSource(std::string path, ImageHeader header, std::unique_ptr<BandDecoder> decoder)
+        : path_(std::move(path)), header_(std::move(header)), image_(std::move(decoder)) {}
+
+    Result<void> prepare(const OpenOptions& options) {
+        if (Result<void> ready = image_.prepare(path_, header_.rows_per_strip, options.max_unit_bytes); !ready)
+            return ready;
+        const DecodedLayout& layout = image_.layout();
         info_.width = layout.width;
         info_.height = layout.height;
         info_.channels = layout.channels;
         info_.type = layout.type;
         info_.tiled = layout.tile_rows > 0;
         info_.alpha_channel = layout.alpha_channel < layout.channels ? layout.alpha_channel : -1;
+        info_.value_scale = header_.value_scale;
+        info_.value_offset = header_.value_offset;
         if (header_.nodata) info_.nodata = nodata_as(layout.type, *header_.nodata);
-
-        const std::size_t sample_bytes = memory_bytes(layout.type);
-        row_bytes_ = info_.width * info_.channels * static_cast<std::int64_t>(sample_bytes);
-        const std::int64_t unit_rows = std::min(info_.height, info_.tiled ? layout.tile_rows : header_.rows_per_strip);
-        info_.unit_bytes = saturating_product(row_bytes_, unit_rows);
-        if (info_.unit_bytes > options.max_unit_bytes) {
-            const std::int64_t needed_mib = info_.unit_bytes / kMiB + 1;
-            const char* unit = info_.tiled                 ? "a row of tiles"
-                               : unit_rows == info_.height ? "the whole image"
-                                                           : "a strip";
-            return unusable(
-                path_,
-                fmt::format("{} must be decoded at once: {} rows of {} bytes, {} MiB, but {} MiB may be held; give "
-                            "--memory at least {} MiB for it, or store the file in smaller strips or tiles",
-                            unit, unit_rows, row_bytes_, needed_mib, options.max_unit_bytes / kMiB, needed_mib));
-        }
-        // A band starts at a unit's first row; small units are grouped.
-        const std::int64_t target = std::min(kBandTargetBytes, options.max_unit_bytes);
-        band_rows_ = unit_rows * std::max<std::int64_t>(1, target / std::max<std::int64_t>(info_.unit_bytes, 1));
-        shift_ = header_.significant_bits > 0 ? static_cast<int>(sample_bytes) * 8 - header_.significant_bits : 0;
+        info_.unit_bytes = image_.unit_bytes();
+        info_.unit_rows = image_.unit_rows();
+        info_.values_are_colours = header_.values_are_colours;
+        if (options.height_band < 1 || options.height_band > info_.channels)
+            return Error{ErrorCode::usage,
+                         fmt::format("{}: band {} is asked for heights, but the file has bands 1 to {}", path_,
+                                     options.height_band, info_.channels)};
+        height_channel_ = options.height_band - 1;
+        shift_ = header_.spread_bits > 0 ? static_cast<int>(memory_bytes(layout.type)) * 8 - header_.spread_bits : 0;
+        Result<ColourRows> colours = ColourRows::make(path_, info_, header_, options.colours);
+        if (!colours) return colours.error();
+        colours_.emplace(std::move(*colours));
+        info_.eight_bit = colours_->eight_bit();
+        info_.shown_bands = colours_->shown_bands();
         return {};
+    }
+
+    Result<void> use_mask(const ImageHeader& header, std::unique_ptr<BandDecoder> decoder, const OpenOptions& options) {
+        const DecodedLayout& layout = decoder->layout();
+        if (layout.width != info_.width || layout.height != info_.height || layout.type != SampleType::u8 ||
+            (layout.channels != 1 && layout.channels != info_.channels))
+            return unusable(path_, "its mask is not of the image's size, so what is valid is unknown");
+        mask_.emplace(std::move(decoder));
+        return mask_->prepare(path_, header.rows_per_strip, options.max_unit_bytes);
     }
 
     void place(std::optional<Georeference> georeference) { georeference_ = std::move(georeference); }
@@ -137,23 +167,17 @@ public:
 
     Result<void> read_rgba8(std::int64_t row_begin, std::int64_t row_end, std::span<std::uint8_t> out) override {
         assert(out.size() == static_cast<std::size_t>((row_end - row_begin) * info_.width * 4));
-        const int colours = info_.alpha_channel >= 0 ? info_.alpha_channel : info_.channels;
-        const bool grey = colours < 3;
-        return for_each_row(row_begin, row_end, [&](std::int64_t row, const std::byte* samples) {
-            std::uint8_t* pixel = out.data() + (row - row_begin) * info_.width * 4;
-            with_memory_type(info_.type, [&](auto sample) {
-                using T = decltype(sample);
-                const T* from = reinterpret_cast<const T*>(samples);
-                for (std::int64_t column = 0; column < info_.width; ++column, from += info_.channels, pixel += 4) {
-                    pixel[0] = to_byte(from[0]);
-                    pixel[1] = grey ? pixel[0] : to_byte(from[1]);
-                    pixel[2] = grey ? pixel[0] : to_byte(from[2]);
-                    pixel[3] = info_.alpha_channel >= 0 ? to_byte(from[info_.alpha_channel]) : std::uint8_t{255};
-                    if (info_.alpha_channel >= 0 && header_.associated_alpha) {
-                        for (int c = 0; c < 3; ++c) pixel[c] = divided_by_alpha(pixel[c], pixel[3]);
-                    }
-                }
-            });
+        return for_each_row(row_begin, row_end, [&](std::int64_t row, const std::byte* samples, const MaskRow& mask) {
+            colours_->to_rgba8(samples, mask, out.data() + (row - row_begin) * info_.width * 4);
+        });
+    }
+
+    Result<void> read_shown(std::int64_t row_begin, std::int64_t row_end, std::span<float> out) override {
+        if (info_.eight_bit) return ImageSource::read_shown(row_begin, row_end, out);
+        const std::int64_t row_values = info_.width * info_.shown_bands;
+        assert(out.size() == static_cast<std::size_t>((row_end - row_begin) * row_values));
+        return for_each_row(row_begin, row_end, [&](std::int64_t row, const std::byte* samples, const MaskRow& mask) {
+            colours_->to_values(samples, mask, out.data() + (row - row_begin) * row_values);
         });
     }
 
@@ -161,68 +185,81 @@ private:
     template <class Out>
     Result<void> read_values(std::int64_t row_begin, std::int64_t row_end, std::span<Out> out) {
         assert(out.size() == static_cast<std::size_t>((row_end - row_begin) * info_.width));
-        return for_each_row(row_begin, row_end, [&](std::int64_t row, const std::byte* samples) {
+        if (info_.values_are_colours)
+            return unusable(path_, "its values are colours (a palette's indices, CMYK or YCbCr), not heights");
+        return for_each_row(row_begin, row_end, [&](std::int64_t row, const std::byte* samples, const MaskRow& mask) {
             Out* to = out.data() + (row - row_begin) * info_.width;
             with_memory_type(info_.type, [&](auto sample) {
                 using T = decltype(sample);
-                const T* from = reinterpret_cast<const T*>(samples);
+                const T* pixels = reinterpret_cast<const T*>(samples);
+                const T* from = pixels + height_channel_;
                 for (std::int64_t column = 0; column < info_.width; ++column, from += info_.channels) {
-                    // Samples of odd widths arrive stretched over their type's range; their own bits are the upper
-                    // ones.
-                    if constexpr (std::is_same_v<T, std::uint8_t>)
-                        to[column] = static_cast<Out>((header_.inverted_by_decoder ? 255 - *from : *from) >> shift_);
-                    else if constexpr (std::is_integral_v<T>)
+                    // Spread samples hold their own bits in the upper ones.
+                    if constexpr (std::is_integral_v<T>)
                         to[column] = static_cast<Out>(shift_ == 0 ? *from : static_cast<T>(*from >> shift_));
                     else
                         to[column] = static_cast<Out>(*from);
                 }
+                void_hidden(pixels, mask, to);
             });
         });
+    }
+
+    template <class T, class Out>
+    void void_hidden(const T* pixels, const MaskRow& mask, Out* values) const {
+        constexpr Out kVoid = std::numeric_limits<Out>::quiet_NaN();
+        if (info_.alpha_channel >= 0 && info_.alpha_channel != height_channel_) {
+            const T* alpha = pixels + info_.alpha_channel;
+            for (std::int64_t column = 0; column < info_.width; ++column, alpha += info_.channels)
+                if (!(*alpha > 0)) values[column] = kVoid;
+        }
+        if (mask.samples == nullptr) return;
+        for (std::int64_t column = 0; column < info_.width; ++column)
+            if (mask.hides(column, height_channel_)) values[column] = kVoid;
     }
 
     template <class Use>
     Result<void> for_each_row(std::int64_t row_begin, std::int64_t row_end, Use&& use) {
         assert(0 <= row_begin && row_begin <= row_end && row_end <= info_.height);
         for (std::int64_t row = row_begin; row < row_end; ++row) {
-            if (row < band_begin_ || row >= band_end_) {
-                if (Result<void> loaded = load_band(row - row % band_rows_); !loaded) return loaded;
+            const Result<const std::byte*> samples = image_.row(row);
+            if (!samples) return about_rows("", samples.error());
+            MaskRow mask;
+            if (mask_) {
+                const Result<const std::byte*> mask_samples = mask_->row(row);
+                if (!mask_samples) return about_rows("its mask's ", mask_samples.error());
+                mask = {reinterpret_cast<const std::uint8_t*>(*mask_samples), mask_->layout().channels};
             }
-            use(row, band_ + (row - band_begin_) * row_bytes_);
+            use(row, *samples, mask);
         }
         return {};
     }
 
-    Result<void> load_band(std::int64_t begin) {
-        const std::int64_t end = std::min(begin + band_rows_, info_.height);
-        band_begin_ = band_end_ = 0;  // a failure leaves nothing that could be taken for pixels
-        const Result<const std::byte*> decoded = decoder_->decode(begin, end);
-        if (!decoded) {
-            if (decoded.error().code != ErrorCode::input) return decoded.error();
-            return unreadable(begin, end, decoded.error().message);
-        }
-        band_ = *decoded;
-        band_begin_ = begin;
-        band_end_ = end;
-        return {};
-    }
-
-    Error unreadable(std::int64_t begin, std::int64_t end, const std::string& reason) const {
-        return unusable(path_, fmt::format("rows {} to {} of {} cannot be decoded ({}); the file is damaged or cut off",
-                                           begin, end - 1, info_.height, reason));
+    // What is not the file's fault (no memory, no decoder program) is said as it is.
+    Error about_rows(const char* whose, const Error& error) const {
+        return error.code == ErrorCode::input ? unusable(path_, whose + error.message) : error;
     }
 
     std::string path_;
     ImageHeader header_;
-    std::unique_ptr<IsolatedDecoder> decoder_;
+    BandRows image_;
+    std::optional<BandRows> mask_;
+    std::optional<ColourRows> colours_;  ///< from prepare on
     ImageInfo info_;
     std::optional<Georeference> georeference_;
-    std::int64_t row_bytes_ = 0;
-    std::int64_t band_rows_ = 1;
+    int height_channel_ = 0;
     int shift_ = 0;
-    const std::byte* band_ = nullptr;  ///< the decoder's: rows [band_begin_, band_end_), all channels, as decoded
-    std::int64_t band_begin_ = 0;
-    std::int64_t band_end_ = 0;
 };
+
+Result<std::unique_ptr<ImageSource>> open_grid(const std::string& path, GridFile grid, const OpenOptions& options) {
+    ImageHeader header;
+    header.rows_per_strip = grid.rows_per_unit;
+    header.nodata = std::move(grid.nodata);
+    auto source = std::make_unique<DecodedSource>(path, header, decode_here(std::move(grid.decoder)));
+    if (Result<void> prepared = source->prepare(options); !prepared) return prepared.error();
+    source->place(std::move(grid.georeference));
+    return std::unique_ptr<ImageSource>(std::move(source));
+}
 
 // Whole frames take several times their size while they are decoded.
 DecoderLimits limits_of(const OpenOptions& options) {
@@ -232,7 +269,20 @@ DecoderLimits limits_of(const OpenOptions& options) {
     return limits;
 }
 
+Result<void> open_mask(const std::string& path, const ImageHeader& image, const OpenOptions& options,
+                       DecodedSource& source) {
+    Result<std::optional<ImageHeader>> header = read_mask_header(path, image);
+    if (!header) return header.error();
+    if (!*header) return {};
+    Result<std::unique_ptr<BandDecoder>> decoder = open_isolated_decoder(path, **header, limits_of(options));
+    if (!decoder) return decoder.error();
+    return source.use_mask(**header, std::move(*decoder), options);
+}
+
 Result<std::unique_ptr<ImageSource>> open_image(const std::string& path, const OpenOptions& options) {
+    Result<std::optional<GridFile>> grid = open_grid_file(path);
+    if (!grid) return grid.error();
+    if (grid->has_value()) return open_grid(path, std::move(**grid), options);
     const DecoderLimits limits = limits_of(options);
     if (Result<void> tried = try_headers(path, limits); !tried) return tried.error();
     Result<ImageHeader> header = read_image_header(path);
@@ -248,10 +298,11 @@ Result<std::unique_ptr<ImageSource>> open_image(const std::string& path, const O
                     "at least {} MiB for it, or store the file in tiles",
                     header->width, header->height, options.max_unit_bytes / kMiB, least / kMiB + 1));
     }
-    Result<std::unique_ptr<IsolatedDecoder>> decoder = open_isolated_decoder(path, *header, limits);
+    Result<std::unique_ptr<BandDecoder>> decoder = open_isolated_decoder(path, *header, limits);
     if (!decoder) return decoder.error();
     auto source = std::make_unique<DecodedSource>(path, *header, std::move(*decoder));
     if (Result<void> prepared = source->prepare(options); !prepared) return prepared.error();
+    if (Result<void> masked = open_mask(path, *header, options, *source); !masked) return masked.error();
     Result<std::optional<Georeference>> georeference = read_georeference(path);
     if (!georeference) return georeference.error();
     source->place(std::move(*georeference));
@@ -276,6 +327,10 @@ bool fits_float32(SampleType type) {
         default:
             return false;
     }
+}
+
+Result<void> ImageSource::read_shown(std::int64_t, std::int64_t, std::span<float>) {
+    return Error{ErrorCode::input, "this image's samples cannot be read before they are stretched"};
 }
 
 Result<std::unique_ptr<ImageSource>> ImageSource::open(const std::string& path, const OpenOptions& options) {

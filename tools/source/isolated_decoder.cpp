@@ -401,11 +401,12 @@ std::int64_t time_for(std::int64_t seconds, std::int64_t bytes, const DecoderLim
     return kSlowness * (seconds + bytes / limits.bytes_per_second);
 }
 
-class ProcessDecoder final : public IsolatedDecoder {
+class ProcessDecoder final : public BandDecoder {
 public:
     ProcessDecoder(std::string path, const ImageHeader& header, const DecoderLimits& limits)
         : path_(std::move(path)), limits_(limits) {
         library_ = header.plain_tiff ? Library::libtiff : Library::openimageio;
+        if (header.plain_tiff) directory_ = header.plain_tiff->directory;
         // Formats that cannot be read in parts are often decoded on opening.
         const bool whole = header.rows_per_strip >= header.height;
         opening_bytes_ = !whole ? 0 : header.height > 0 ? header.width * header.height * 4 : limits.memory_bytes / 4;
@@ -448,7 +449,8 @@ public:
 
 private:
     Result<DecoderProcess> start() {
-        const OpenRequest request{false, limits_.memory_bytes, time_for(limits_.cpu_seconds, opening_bytes_, limits_)};
+        const OpenRequest request{false, directory_, limits_.memory_bytes,
+                                  time_for(limits_.cpu_seconds, opening_bytes_, limits_)};
         Result<DecoderProcess> process = DecoderProcess::start(library_, request, path_);
         if (!process) return process.error();
         const Result<Answer> answer =
@@ -473,6 +475,7 @@ private:
     std::string path_;
     DecoderLimits limits_;
     Library library_ = Library::libtiff;
+    std::uint64_t directory_ = 0;
     std::int64_t opening_bytes_ = 0;
     DecodedLayout layout_;
     SharedBand band_;
@@ -481,7 +484,7 @@ private:
 }  // namespace
 
 Result<void> try_headers(const std::string& path, const DecoderLimits& limits) {
-    const OpenRequest request{true, limits.memory_bytes, time_for(limits.cpu_seconds, 0, limits)};
+    const OpenRequest request{true, 0, limits.memory_bytes, time_for(limits.cpu_seconds, 0, limits)};
     Result<DecoderProcess> process = DecoderProcess::start(Library::libtiff, request, path);
     if (!process) return process.error();
     const Result<Answer> answer = process->answer(request.cpu_seconds, time_for(limits.wall_seconds, 0, limits));
@@ -489,11 +492,11 @@ Result<void> try_headers(const std::string& path, const DecoderLimits& limits) {
     return {};
 }
 
-Result<std::unique_ptr<IsolatedDecoder>> open_isolated_decoder(const std::string& path, const ImageHeader& header,
-                                                               const DecoderLimits& limits) {
+Result<std::unique_ptr<BandDecoder>> open_isolated_decoder(const std::string& path, const ImageHeader& header,
+                                                           const DecoderLimits& limits) {
     auto decoder = std::make_unique<ProcessDecoder>(path, header, limits);
     if (Result<void> opened = decoder->open(); !opened) return opened.error();
-    return std::unique_ptr<IsolatedDecoder>(std::move(decoder));
+    return std::unique_ptr<BandDecoder>(std::move(decoder));
 }
 
 DecoderUsage decoder_usage() { return accounts().usage(); }

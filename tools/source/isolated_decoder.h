@@ -27,23 +27,14 @@ struct DecoderLimits {
     std::int64_t wall_seconds = 60;
 };
 
-/// Reads header and georeference of a file where nothing can come to harm, before the caller does so itself. Errors:
-/// those of read_image_header, or what became of the process (ErrorCode::input); ErrorCode::io where there is no
-/// decoder program.
+/// Reads headers (a mask's, too) and georeference of a file where nothing can come to harm, before the caller does so
+/// itself. Errors: those of read_image_header, or what became of the process (ErrorCode::input); ErrorCode::io where
+/// there is no decoder program.
 Result<void> try_headers(const std::string& path, const DecoderLimits& limits = {});
 
-/// A file that is being decoded elsewhere. One thread at a time.
-class IsolatedDecoder {
-public:
-    virtual ~IsolatedDecoder() = default;
-    virtual const DecodedLayout& layout() const = 0;
-    /// Rows [begin, end) as PixelDecoder::decode gives them, in memory that is good until the next call.
-    virtual Result<const std::byte*> decode(std::int64_t begin, std::int64_t end) = 0;
-};
-
-/// By libtiff for header.plain_tiff, else by OpenImageIO. Errors as above and the decoder's.
-Result<std::unique_ptr<IsolatedDecoder>> open_isolated_decoder(const std::string& path, const ImageHeader& header,
-                                                               const DecoderLimits& limits = {});
+/// By libtiff for header.plain_tiff (of a mask, too), else by OpenImageIO. Errors as above and the decoder's.
+Result<std::unique_ptr<BandDecoder>> open_isolated_decoder(const std::string& path, const ImageHeader& header,
+                                                           const DecoderLimits& limits = {});
 
 /// What all decoder processes took so far: processor time, and the peak of the memory that they held at one time.
 struct DecoderUsage {

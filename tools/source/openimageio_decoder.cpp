@@ -67,9 +67,8 @@ public:
                 path,
                 fmt::format("its header says {} x {} samples but its decoder {} x {}; the file is not what it seems",
                             header.width, header.height, spec_.width, spec_.height));
-        layout_ = {spec_.width,     spec_.height,
-                   spec_.nchannels, header.kind == ImageKind::tiff ? header.alpha_channel : spec_.alpha_channel,
-                   *type,           spec_.tile_width > 0 ? spec_.tile_height : 0};
+        layout_ = {spec_.width,         spec_.height, spec_.nchannels,
+                   spec_.alpha_channel, *type,        spec_.tile_width > 0 ? spec_.tile_height : 0};
         // Half to float is the one conversion that OpenImageIO does without rescaling; integers are taken as they are.
         format_ = *type == SampleType::f16 ? OIIO::TypeDesc(OIIO::TypeDesc::FLOAT) : spec_.format;
         return {};

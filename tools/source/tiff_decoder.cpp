@@ -1,7 +1,8 @@
-// Plain TIFFs (grey or RGB, whole-byte samples: what heights and orthoimages are) go straight through libtiff:
-// OpenImageIO 2.4 returns uninitialised memory for tiled float64 and takes damaged deflate strips for whole.
+// TIFFs go straight through libtiff: OpenImageIO 2.4 returns uninitialised memory for tiled float64, takes damaged
+// deflate strips for whole, inverts grey where 0 is white and spends minutes on some CMYK.
 #include <algorithm>
 #include <cstring>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -39,12 +40,42 @@ void put_value(SampleType type, double value, std::byte* out) {
             return put<std::uint64_t>(value, out);
         case SampleType::i64:
             return put<std::int64_t>(value, out);
-        case SampleType::f16:
-            return put<half>(static_cast<float>(value), out);
+        case SampleType::f16:  // float in memory
         case SampleType::f32:
             return put<float>(value, out);
         case SampleType::f64:
             return put<double>(value, out);
+    }
+}
+
+// Samples of other than whole bytes: a row is a string of bits, the first one highest (TIFF 6.0, FillOrder 1). So
+// are 24-bit ones as GDAL writes and reads them, whatever the file's byte order.
+class BitReader {
+public:
+    explicit BitReader(const std::byte* from) : from_(reinterpret_cast<const unsigned char*>(from)) {}
+    std::uint32_t next(int bits) {
+        while (held_ < bits) {
+            window_ = window_ << 8 | *from_++;
+            held_ += 8;
+        }
+        held_ -= bits;
+        return static_cast<std::uint32_t>(window_ >> held_ & ((std::uint64_t{1} << bits) - 1));
+    }
+
+private:
+    const unsigned char* from_;
+    std::uint64_t window_ = 0;  ///< its low held_ bits are still to come
+    int held_ = 0;
+};
+
+template <class T>
+void unpack_bits(int bits, const std::byte* from, std::byte* to, std::size_t step, std::int64_t count) {
+    BitReader reader(from);
+    for (std::int64_t i = 0; i < count; ++i, to += step) {
+        std::uint32_t value = reader.next(bits);
+        if (std::numeric_limits<T>::is_signed && (value >> (bits - 1)) != 0) value |= ~0u << bits;
+        const T sample = static_cast<T>(value);
+        std::memcpy(to, &sample, sizeof(T));
     }
 }
 
@@ -54,7 +85,6 @@ public:
         : file_(std::move(file)), header_(header), plain_(*header.plain_tiff) {
         layout_ = {header.width,         header.height, plain_.channels,
                    header.alpha_channel, plain_.type,   plain_.tile_width > 0 ? header.rows_per_strip : 0};
-        stored_bytes_ = plain_.type == SampleType::f16 ? sizeof(half) : memory_bytes(plain_.type);
         out_bytes_ = memory_bytes(plain_.type);
     }
 
@@ -77,69 +107,122 @@ private:
         const std::int64_t unit_rows = tiled ? header_.rows_per_strip : rows;
         const int planes = plain_.separate_planes ? plain_.channels : 1;
         const int channels = plain_.separate_planes ? 1 : plain_.channels;
-        const std::size_t unit_bytes = static_cast<std::size_t>(unit_columns * unit_rows * channels) * stored_bytes_;
-        unit_.resize(unit_bytes);
+        const int bits = plain_.rgba_by_libtiff ? 8 : plain_.bits;
+        const auto unit_row_bytes = static_cast<std::size_t>((unit_columns * channels * bits + 7) / 8);
+        unit_.resize(unit_row_bytes * static_cast<std::size_t>(unit_rows));
         for (int plane = 0; plane < planes; ++plane) {
             for (std::int64_t column = 0; column < layout_.width; column += unit_columns) {
-                const auto x = static_cast<std::uint32_t>(column);
-                const auto y = static_cast<std::uint32_t>(row);
-                const auto sample = static_cast<std::uint16_t>(plane);
-                TIFF* tiff = file_->get();
-                const std::uint32_t index =
-                    tiled ? TIFFComputeTile(tiff, x, y, 0, sample) : TIFFComputeStrip(tiff, y, sample);
-                if (Result<void> read = read_unit(index, tiled, unit_bytes); !read) return read;
+                const Unit unit{static_cast<std::uint32_t>(column), static_cast<std::uint32_t>(row), unit_rows, plane};
+                Result<bool> written = read_unit(unit);
+                if (!written) return written.error();
                 const std::int64_t columns = std::min(unit_columns, layout_.width - column);
                 for (std::int64_t r = 0; r < rows; ++r) {
-                    const std::byte* from =
-                        unit_.data() + static_cast<std::size_t>(r * unit_columns * channels) * stored_bytes_;
                     std::byte* to =
                         out +
                         static_cast<std::size_t>((r * layout_.width + column) * layout_.channels + plane) * out_bytes_;
-                    copy_samples(from, to, columns * channels);
+                    if (*written)
+                        copy_samples(unit_.data() + static_cast<std::size_t>(r) * unit_row_bytes, to,
+                                     columns * channels);
+                    else
+                        fill_samples(to, columns * channels);
                 }
             }
         }
         return {};
     }
 
-    Result<void> read_unit(std::uint32_t index, bool tiled, std::size_t bytes) {
+    struct Unit {
+        std::uint32_t column, row;
+        std::int64_t rows;  ///< of the tile; of a strip those that the image has
+        int plane;
+    };
+
+    // False: the unit was never written, so it has neither place nor length.
+    Result<bool> read_unit(const Unit& unit) {
         TIFF* tiff = file_->get();
-        // A unit that was never written has neither place nor length; it means nodata, or zero where there is none.
-        if (TIFFGetStrileByteCount(tiff, index) == 0 && TIFFGetStrileOffset(tiff, index) == 0) {
-            const std::optional<double> nodata =
-                header_.nodata ? nodata_as(plain_.type, *header_.nodata) : std::nullopt;
-            for (std::size_t at = 0; at < bytes; at += stored_bytes_)
-                put_value(plain_.type, nodata.value_or(0), unit_.data() + at);
-            return {};
-        }
+        const bool tiled = plain_.tile_width > 0;
+        const auto plane = static_cast<std::uint16_t>(unit.plane);
+        const std::uint32_t index =
+            tiled ? TIFFComputeTile(tiff, unit.column, unit.row, 0, plane) : TIFFComputeStrip(tiff, unit.row, plane);
+        if (TIFFGetStrileByteCount(tiff, index) == 0 && TIFFGetStrileOffset(tiff, index) == 0) return false;
         file_->clear_messages();
-        const auto size = static_cast<tmsize_t>(bytes);
-        const tmsize_t read = tiled ? TIFFReadEncodedTile(tiff, index, unit_.data(), size)
-                                    : TIFFReadEncodedStrip(tiff, index, unit_.data(), size);
+        const auto size = static_cast<tmsize_t>(unit_.size());
+        const tmsize_t read = plain_.rgba_by_libtiff ? read_rgba(unit)
+                              : tiled                ? TIFFReadEncodedTile(tiff, index, unit_.data(), size)
+                                                     : TIFFReadEncodedStrip(tiff, index, unit_.data(), size);
         if (read != size || !file_->messages().empty()) {
             const std::string reason =
                 file_->messages().empty() ? fmt::format("{} of {} bytes", read, size) : file_->messages();
             return Error{ErrorCode::input, fmt::format("{} {}: {}", tiled ? "tile" : "strip", index, reason)};
         }
-        return {};
+        return true;
+    }
+
+    // libtiff's conversion gives a word a pixel, R in its lowest byte, and the last row first.
+    tmsize_t read_rgba(const Unit& unit) {
+        TIFF* tiff = file_->get();
+        const bool tiled = plain_.tile_width > 0;
+        const auto columns = static_cast<std::size_t>(tiled ? plain_.tile_width : layout_.width);
+        const auto rows = static_cast<std::size_t>(unit.rows);
+        words_.resize(columns * rows);
+        const int read = tiled ? TIFFReadRGBATileExt(tiff, unit.column, unit.row, words_.data(), 1)
+                               : TIFFReadRGBAStripExt(tiff, unit.row, words_.data(), 1);
+        if (read != 1) return 0;
+        std::byte* to = unit_.data();
+        for (std::size_t r = rows; r-- > 0;) {
+            for (const std::uint32_t *word = &words_[r * columns], *end = word + columns; word != end; ++word)
+                for (int shift = 0; shift < 32; shift += 8) *to++ = static_cast<std::byte>(*word >> shift & 255);
+        }
+        return static_cast<tmsize_t>(unit_.size());
     }
 
     // With separate planes the samples of one plane lie `channels` apart in the output.
+    std::size_t out_step() const {
+        return plain_.separate_planes ? out_bytes_ * static_cast<std::size_t>(plain_.channels) : out_bytes_;
+    }
+
+    // What was never written means nodata, or zero where there is none.
+    void fill_samples(std::byte* to, std::int64_t count) const {
+        const std::optional<double> nodata = header_.nodata ? nodata_as(plain_.type, *header_.nodata) : std::nullopt;
+        for (std::int64_t i = 0; i < count; ++i, to += out_step()) put_value(plain_.type, nodata.value_or(0), to);
+    }
+
     void copy_samples(const std::byte* from, std::byte* to, std::int64_t count) const {
-        const std::size_t step =
-            plain_.separate_planes ? out_bytes_ * static_cast<std::size_t>(plain_.channels) : out_bytes_;
-        if (plain_.type == SampleType::f16) {
-            for (std::int64_t i = 0; i < count; ++i, from += stored_bytes_, to += step) {
+        const std::size_t step = out_step();
+        if (plain_.rgba_by_libtiff) {
+            std::memcpy(to, from, static_cast<std::size_t>(count));
+        } else if (plain_.type == SampleType::f16) {
+            for (std::int64_t i = 0; i < count; ++i, from += sizeof(half), to += step) {
                 half stored;
                 std::memcpy(&stored, from, sizeof stored);
                 const float wide = stored;
                 std::memcpy(to, &wide, sizeof wide);
             }
+        } else if (static_cast<std::size_t>(plain_.bits) != out_bytes_ * 8) {
+            unpack(from, to, count);
         } else if (step == out_bytes_) {
             std::memcpy(to, from, static_cast<std::size_t>(count) * out_bytes_);
         } else {
-            for (std::int64_t i = 0; i < count; ++i, from += stored_bytes_, to += step)
-                std::memcpy(to, from, stored_bytes_);
+            for (std::int64_t i = 0; i < count; ++i, from += out_bytes_, to += step) std::memcpy(to, from, out_bytes_);
+        }
+    }
+
+    void unpack(const std::byte* from, std::byte* to, std::int64_t count) const {
+        const std::size_t step = out_step();
+        const int bits = plain_.bits;
+        switch (plain_.type) {
+            case SampleType::u8:
+                return unpack_bits<std::uint8_t>(bits, from, to, step, count);
+            case SampleType::i8:
+                return unpack_bits<std::int8_t>(bits, from, to, step, count);
+            case SampleType::u16:
+                return unpack_bits<std::uint16_t>(bits, from, to, step, count);
+            case SampleType::i16:
+                return unpack_bits<std::int16_t>(bits, from, to, step, count);
+            case SampleType::i32:
+                return unpack_bits<std::int32_t>(bits, from, to, step, count);
+            default:
+                return unpack_bits<std::uint32_t>(bits, from, to, step, count);
         }
     }
 
@@ -147,38 +230,21 @@ private:
     ImageHeader header_;
     PlainTiff plain_;
     DecodedLayout layout_;
-    std::size_t stored_bytes_ = 1;
     std::size_t out_bytes_ = 1;
     std::vector<std::byte> unit_;
+    std::vector<std::uint32_t> words_;
 };
 
 }  // namespace
-
-std::size_t memory_bytes(SampleType type) {
-    switch (type) {
-        case SampleType::u8:
-        case SampleType::i8:
-            return 1;
-        case SampleType::u16:
-        case SampleType::i16:
-            return 2;
-        case SampleType::u32:
-        case SampleType::i32:
-        case SampleType::f16:  // widened
-        case SampleType::f32:
-            return 4;
-        case SampleType::u64:
-        case SampleType::i64:
-        case SampleType::f64:
-            return 8;
-    }
-    return 0;
-}
 
 Result<std::unique_ptr<PixelDecoder>> make_tiff_decoder(const std::string& path, const ImageHeader& header) {
     auto file = std::make_unique<TiffFile>(path, "rm");
     if (!file->valid())
         return Error{ErrorCode::input, fmt::format("{}: not a readable TIFF ({})", path, file->messages())};
+    const PlainTiff& plain = *header.plain_tiff;
+    if (plain.directory != 0 && TIFFSetSubDirectory(file->get(), plain.directory) != 1)
+        return Error{ErrorCode::input, fmt::format("{}: its mask cannot be read ({})", path, file->messages())};
+    if (plain.ycbcr_jpeg) TIFFSetField(file->get(), TIFFTAG_JPEGCOLORMODE, JPEGCOLORMODE_RGB);
     return std::unique_ptr<PixelDecoder>(std::make_unique<TiffDecoder>(std::move(file), header));
 }
 

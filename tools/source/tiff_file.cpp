@@ -52,6 +52,16 @@ bool TiffFile::flush_and_close() {
     return flushed && messages_->empty();
 }
 
+std::string text_tag(TIFF* file, std::uint32_t tag) {
+    const TIFFField* field = TIFFFindField(file, tag, TIFF_ASCII);
+    const char* text = nullptr;
+    if (field == nullptr) return {};
+    if (TIFFFieldPassCount(field) == 0)
+        return TIFFGetField(file, tag, &text) == 1 && text != nullptr ? text : std::string();
+    std::uint32_t count = 0;
+    return TIFFGetField(file, tag, &count, &text) == 1 && text != nullptr ? std::string(text, count) : std::string();
+}
+
 bool looks_like_tiff(const std::string& path) {
     std::array<char, 4> magic{};
     std::ifstream file(path, std::ios::binary);

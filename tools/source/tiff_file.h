@@ -2,6 +2,7 @@
 // the process has installed. Owned by one thread at a time.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string>
 
@@ -30,6 +31,9 @@ private:
     std::unique_ptr<std::string> messages_;
     tiff* handle_ = nullptr;
 };
+
+/// Text of a tag of GDAL's (42112, 42113), empty where there is none.
+std::string text_tag(tiff* file, std::uint32_t tag);
 
 /// True when the first bytes of the file are those of a classic or big TIFF.
 bool looks_like_tiff(const std::string& path);

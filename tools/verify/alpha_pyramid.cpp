@@ -56,9 +56,9 @@ void halve_into_quadrant(const AlphaRaster& fine, int quadrant, AlphaRaster& coa
     halve(fine.texels.data(), fine.size, out, pitch);
 }
 
-TexelGrid::TexelGrid(const Dataset& d)
-    : log2_cells_(d.lattice.tile_cells_log2 + d.lattice.deepest_level - d.texture_deepest_level - d.texture_size_log2) {
-}
+TexelGrid::TexelGrid(const Dataset& d, int texture_level, int step_log2)
+    : log2_cells_(d.lattice.tile_cells_log2 + d.lattice.deepest_level - texture_level - d.texture_size_log2 -
+                  step_log2) {}
 
 void mark_present(const TexelGrid& grid, std::int64_t x, std::int64_t y, const CellPresence& presence,
                   AlphaRaster& alpha) {
@@ -73,7 +73,7 @@ void mark_present(const TexelGrid& grid, std::int64_t x, std::int64_t y, const C
         std::vector<std::int64_t> cells;
         for (std::int64_t k = from; k < to; ++k) {
             const std::int64_t cell = grid.cell_of_texel(first_texel + k);
-            if (cell >= first_cell + presence.cells) break;
+            if (cell >= first_cell + presence.extent()) break;
             cells.push_back(cell);
         }
         return std::pair(from, cells);

@@ -26,12 +26,12 @@ struct AlphaRaster {
 /// One step of the recursion: (sum of four + 2) >> 2. From `fine` into a quadrant of `coarse` of the same size.
 void halve_into_quadrant(const AlphaRaster& fine, int quadrant, AlphaRaster& coarse);
 
-/// Finest cells under a texture tile's deepest texels.
+/// Cells under the texels of a level of the texture pyramid: finest ones, or such of 2^step_log2 finest ones a side.
 class TexelGrid {
 public:
-    explicit TexelGrid(const Dataset& dataset);
+    TexelGrid(const Dataset& dataset, int texture_level, int step_log2 = 0);
 
-    /// The finest cell, east or south, that holds the centre of texel `texel` (counted over the whole deepest level).
+    /// The cell, east or south, that holds the centre of texel `texel` (counted over the whole level).
     std::int64_t cell_of_texel(std::int64_t texel) const {
         return log2_cells_ >= 1 ? (2 * texel + 1) << (log2_cells_ - 1) : (2 * texel + 1) >> (1 - log2_cells_);
     }
@@ -46,20 +46,24 @@ public:
     }
 
 private:
-    int log2_cells_;  // a deepest texel is 2^log2_cells_ finest cells wide
+    int log2_cells_;  // a texel is 2^log2_cells_ cells wide
 };
 
-/// A deepest-level height tile's cells.
+/// The cells of a leaf of the heights, each 2^step_log2 finest cells a side.
 struct CellPresence {
-    std::int64_t first_i = 0, first_j = 0;  ///< its north-west cell
+    std::int64_t first_i = 0, first_j = 0;  ///< its north-west finest cell
     std::int64_t cells = 0;                 ///< a side
-    std::span<const std::uint8_t> bits;     ///< cells * cells, or empty: all
+    int step_log2 = 0;
+    std::span<const std::uint8_t> bits;  ///< cells * cells, or empty: all
+    std::int64_t extent() const { return cells << step_log2; }
+    /// Of the cell that finest cell (i, j) lies in.
     bool at(std::int64_t i, std::int64_t j) const {
-        return bits.empty() || bits[static_cast<std::size_t>((j - first_j) * cells + (i - first_i))] != 0;
+        return bits.empty() ||
+               bits[static_cast<std::size_t>(((j - first_j) >> step_log2) * cells + ((i - first_i) >> step_log2))] != 0;
     }
 };
 
-/// Sets to 255 the texels of deepest-level texture tile (x, y) whose centre lies in a present cell of `presence`.
+/// Sets to 255 the texels of texture tile (x, y) of the grid's level whose centre lies in a present cell of `presence`.
 void mark_present(const TexelGrid& grid, std::int64_t x, std::int64_t y, const CellPresence& presence,
                   AlphaRaster& alpha);
 

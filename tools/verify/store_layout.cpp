@@ -239,6 +239,16 @@ Result<void> name_unreached_rows(const SqliteStore& store, TileKind kind, Proble
         if (found.error().code != ErrorCode::store && !failure) failure = found.error();
         return std::nullopt;
     };
+    // Textures may be deeper than the leaf over them.
+    const auto has_heights = [&](TileId id) {
+        TileId over = ancestor_at(id, std::min(id.level, lattice.deepest_level));
+        for (;; over = parent_of(over)) {
+            const auto height = read(TileKind::height, over);
+            if (!height) return true;
+            if (*height) return over == id || (!row.payload.empty() && (row.payload[0] & 15) == 0);
+            if (over.level == 0) return false;
+        }
+    };
     auto ok = store.for_each(kind, [&](const SqliteStore::RowView& view) {
         if (previous && view.key <= *previous) return false;
         previous = view.key;
@@ -253,10 +263,7 @@ Result<void> name_unreached_rows(const SqliteStore& store, TileKind kind, Proble
             else if (parent && (row.payload.empty() || (row.payload[0] >> quadrant_of(*id) & 1) == 0))
                 problems.add(tile + " is an orphan: its parent does not know it");
         }
-        if (kind == TileKind::texture && id->level <= lattice.deepest_level) {
-            const auto height = read(TileKind::height, *id);
-            if (height && !*height) problems.add(tile + " has no height tile");
-        }
+        if (kind == TileKind::texture && !has_heights(*id)) problems.add(tile + " has no height tile");
         if (++count % kRowsBetweenAsking == 0 && !go_on() && !failure)
             failure = Error{ErrorCode::interrupted, store.path() + ": stopped"};
         return !failure;

@@ -6,11 +6,29 @@
 
 namespace scree {
 
+void TileWalk::check_texture_end(const Frame& frame) {
+    if (frame.textured || frame.tile->header.texture_ends || frame.id.level >= dataset_.texture_deepest_level) return;
+    problems_.add(fmt::format("height tile {}/{}/{} does not say that textures end here: they end above it",
+                              frame.id.level, frame.id.x, frame.id.y));
+}
+
 void TileWalk::check_texture(const Frame& frame) {
     const TextureRow row = read_texture(frame.id);
-    const std::uint8_t children =
-        frame.id.level == dataset_.texture_deepest_level ? std::uint8_t{0} : frame.texture_children;
-    judge_texture(frame.id, row, children, frame.complete ? &frame.alpha : nullptr);
+    // Refined wholly or not at all.
+    judge_texture(frame.id, row, refined(frame) ? frame.texture_children : std::uint8_t{0},
+                  frame.complete ? &frame.alpha : nullptr);
+}
+
+// The texels over a leaf of the heights belong to the deepest texture there.
+void TileWalk::mark_leaf(Frame& frame, const CellPresence& presence) {
+    if (refined(frame)) {
+        frame.texture_children = visit_texture_children(frame.id, presence, frame.alpha, frame.complete);
+        return;
+    }
+    std::size_t k = frames_.size() - 1;
+    while (!frames_[k]->textured) --k;  // roots are
+    Frame& target = *frames_[k];
+    mark_present(TexelGrid(dataset_, target.id.level), target.id.x, target.id.y, presence, target.alpha);
 }
 
 TileWalk::TextureRow TileWalk::read_texture(TileId id) {
@@ -50,7 +68,7 @@ void TileWalk::judge_texture(TileId id, const TextureRow& row, std::uint8_t chil
                         name, wrong->texels, wrong->mip, wrong->column, wrong->row));
 }
 
-// Children of `id` at levels below the heights: stored where a texel is opaque. Fills `alpha` from them.
+// Children of `id` at levels below a leaf of the heights: stored where a texel is opaque. Fills `alpha` from them.
 std::uint8_t TileWalk::visit_texture_children(TileId id, const CellPresence& presence, AlphaRaster& alpha,
                                               bool& complete) {
     std::uint8_t mask = 0;
@@ -75,26 +93,30 @@ bool TileWalk::visit_texture_below(TileId id, const CellPresence& presence, Alph
         return false;  // only rows that exist are descended into: that bounds the walk on any store
     bool complete = true;
     std::uint8_t mask = 0;
-    if (id.level == dataset_.texture_deepest_level)
-        mark_present(grid_, id.x, id.y, presence, alpha);
+    if (!row.tile)
+        complete = false;
+    else if (row.tile->child_mask == 0 || id.level >= dataset_.texture_deepest_level)
+        mark_present(TexelGrid(dataset_, id.level), id.x, id.y, presence, alpha);
     else
         mask = visit_texture_children(id, presence, alpha, complete);
     judge_texture(id, row, mask, complete ? &alpha : nullptr);
     return complete && !failure_;
 }
 
-// Whether a deepest texel under texture tile `id`, deeper than the heights, has its centre in a present cell.
+// Whether a texel of the deepest level, stored there or not, under texture tile `id`, deeper than a leaf of the
+// heights, has its centre in a present cell of it.
 bool TileWalk::any_opaque(TileId id, const CellPresence& presence) const {
-    const int log2_cells = lattice_.tile_cells_log2 + lattice_.deepest_level - id.level;
+    const TexelGrid grid(dataset_, dataset_.texture_deepest_level, presence.step_log2);
+    const int log2_cells = lattice_.tile_cells_log2 + lattice_.deepest_level - id.level - presence.step_log2;
     const auto first_cell = [&](std::int64_t tile) {
         return log2_cells >= 0 ? tile << log2_cells : tile >> -log2_cells;
     };
     const std::int64_t side = log2_cells >= 0 ? std::int64_t{1} << log2_cells : 1;
     const std::int64_t i0 = first_cell(id.x), j0 = first_cell(id.y);
     for (std::int64_t j = j0; j < j0 + side; ++j) {
-        if (!grid_.hits(j)) continue;
+        if (!grid.hits(j)) continue;
         for (std::int64_t i = i0; i < i0 + side; ++i)
-            if (grid_.hits(i) && presence.at(i, j)) return true;
+            if (grid.hits(i) && presence.at(i << presence.step_log2, j << presence.step_log2)) return true;
     }
     return false;
 }

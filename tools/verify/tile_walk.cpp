@@ -20,8 +20,7 @@ TileWalk::TileWalk(const Dataset& dataset, TileReader& reader, VerifyReport& rep
       report_(report),
       problems_(problems),
       tick_(std::move(tick)),
-      heights_(reader, dataset),
-      grid_(dataset) {}
+      heights_(reader, dataset) {}
 
 Result<void> TileWalk::run() {
     visit_roots();
@@ -69,24 +68,27 @@ bool TileWalk::visit(TileId id) {
     frame.tile = *tile;
     frame.block = coarsest_block(frame.tile->samples, n);
     frame.stride = lattice_.tile_extent(id.level) / 2;
-    if (id.level <= dataset_.texture_deepest_level) frame.alpha = AlphaRaster(dataset_.texture_size());
+    frame.textured = parent == nullptr || refined(*parent);
+    if (frame.textured) frame.alpha = AlphaRaster(dataset_.texture_size());
 
-    check_header(frame);
+    check_header(frame, parent);
     check_range(frame);
     if (parent != nullptr) compare_with_parent(frame, *parent);
     compare_with_neighbours(frame);
-    if (id.level == lattice_.deepest_level) {
+    // A deepest tile that says it has children is a leaf all the same: the walk goes no further down.
+    if (is_leaf(frame)) {
         visit_leaf(frame);
     } else {
+        check_grading(frame);
         for (int q = 0; q < 4 && !failure_; ++q)
             if ((frame.tile->header.child_mask >> q & 1) != 0 && !visit(child_of(id, q))) frame.complete = false;
         frame.texture_children = frame.tile->header.child_mask;
         check_coarsest_bound(frame);
     }
-    if (id.level <= dataset_.texture_deepest_level && !failure_) check_texture(frame);
+    if (frame.textured && !failure_) check_texture(frame);
 
     const bool complete = frame.complete && !failure_;
-    if (frames_.size() > 1 && complete && id.level <= dataset_.texture_deepest_level)
+    if (frames_.size() > 1 && complete && frame.textured)
         halve_into_quadrant(frame.alpha, quadrant_of(id), frames_[frames_.size() - 2]->alpha);
     if (id.level == 0) {
         lowest_n_ = std::min(lowest_n_, frame.tile->header.own.min_n);
@@ -96,14 +98,27 @@ bool TileWalk::visit(TileId id) {
     return complete;
 }
 
-void TileWalk::check_header(const Frame& frame) {
-    const bool leaf = frame.id.level == lattice_.deepest_level;
-    if (leaf && frame.tile->header.child_mask != 0)
+bool TileWalk::is_leaf(const Frame& frame) const {
+    return frame.tile->header.is_leaf() || frame.id.level >= lattice_.deepest_level;
+}
+
+void TileWalk::check_header(const Frame& frame, const Frame* parent) {
+    const HeightTileHeader& header = frame.tile->header;
+    const bool deepest = frame.id.level == lattice_.deepest_level;
+    if (deepest && !header.is_leaf())
         problems_.add(name("height", frame.id) + " is of the deepest level and says that it has children");
-    if (!leaf && frame.tile->header.child_mask == 0)
-        problems_.add(name("height", frame.id) + " has no child: a tile without a present cell is not stored");
-    if (!leaf && !frame.tile->presence.empty())
-        problems_.add(name("height", frame.id) + " holds presence bits, which belong to the deepest level");
+    if (!header.is_leaf() && !frame.tile->presence.empty())
+        problems_.add(name("height", frame.id) + " holds presence bits, which belong to leaves");
+    check_texture_end(frame);
+    if (parent == nullptr) return;
+    const HeightTileHeader& above = parent->tile->header;
+    const int q = quadrant_of(frame.id);
+    if ((above.leaf_mask >> q & 1) != (header.is_leaf() && !deepest ? 1 : 0))
+        problems_.add(fmt::format("{} is {} leaf above the deepest level; its parent says otherwise",
+                                  name("height", frame.id), header.is_leaf() && !deepest ? "a" : "no"));
+    if ((above.texture_end_mask >> q & 1) != (header.texture_ends ? 1 : 0))
+        problems_.add(
+            fmt::format("{}: its parent says otherwise of whether its textures end here", name("height", frame.id)));
 }
 
 void TileWalk::check_range(const Frame& frame) {
@@ -164,6 +179,35 @@ void TileWalk::compare_with_neighbours(const Frame& frame) {
     compare_border(frame, {0, id.x - 1, id.y + 1}, 0, m, 0, 0, 1, m, -m);
 }
 
+// Across each side that a child touches there is a tile of this level, or nothing: no coarser leaf. So leaves that
+// share an edge are a level apart at most.
+void TileWalk::check_grading(const Frame& frame) {
+    static constexpr std::array<std::array<int, 4>, 4> kSides{
+        {{0, -1, 0, 1}, {1, 0, 1, 3}, {0, 1, 2, 3}, {-1, 0, 0, 2}}};  // step x, y; the quadrants that touch
+    const std::uint8_t children = frame.tile->header.child_mask;
+    for (const auto& [dx, dy, q, r] : kSides) {
+        const bool first = (children >> q & 1) != 0;
+        if (!first && (children >> r & 1) == 0) continue;
+        const auto leaf = leaf_over({frame.id.level, frame.id.x + dx, frame.id.y + dy});
+        if (!leaf || leaf->level >= frame.id.level) continue;
+        const TileId child = child_of(frame.id, first ? q : r);
+        problems_.add(fmt::format("{} lies beside the leaf {}/{}/{}: more than a level apart", name("height", child),
+                                  leaf->level, leaf->x, leaf->y));
+    }
+}
+
+// The leaf that covers all of `id`, if there is one.
+std::optional<TileId> TileWalk::leaf_over(TileId id) {
+    if (!lattice_.contains(id)) return std::nullopt;
+    for (;; id = parent_of(id)) {
+        const auto tile = heights_.get(id);
+        if (!tile && tile.error().code != ErrorCode::store) failure_ = tile.error();
+        if (!tile) return std::nullopt;  // damaged: named when the walk comes to it
+        if (*tile) return (*tile)->header.is_leaf() ? std::optional(id) : std::nullopt;
+        if (id.level == 0) return std::nullopt;
+    }
+}
+
 // `count` samples of the frame's tile from (from_i, from_j) on, against the neighbour's, whose indices differ by
 // `across`.
 void TileWalk::compare_border(const Frame& frame, TileId neighbour, int from_i, int from_j, int step_i, int step_j,
@@ -193,17 +237,18 @@ void TileWalk::compare_border(const Frame& frame, TileId neighbour, int from_i, 
 
 void TileWalk::visit_leaf(Frame& frame) {
     const HeightTile& tile = *frame.tile;
-    const int n = lattice_.tile_cells_log2;
-    const std::int64_t m = lattice_.tile_cells();
+    const int n = lattice_.tile_cells_log2, step_log2 = lattice_.deepest_level - frame.id.level;
+    const std::int64_t m = lattice_.tile_cells(), step = lattice_.step(frame.id.level);
     const LatticePoint corner = lattice_.corner(frame.id);
-    const CellPresence presence{corner.i, corner.j, m, tile.presence};
+    const CellPresence presence{corner.i, corner.j, m, step_log2, tile.presence};
+    coarsest_leaf_ = std::min(coarsest_leaf_, frame.id.level);
 
     std::int64_t present = 0, outside = 0;
-    for (std::int64_t j = corner.j; j < corner.j + m; ++j) {
-        for (std::int64_t i = corner.i; i < corner.i + m; ++i) {
+    for (std::int64_t j = corner.j; j < corner.j + presence.extent(); j += step) {
+        for (std::int64_t i = corner.i; i < corner.i + presence.extent(); i += step) {
             if (!presence.at(i, j)) continue;
             ++present;
-            if (i >= lattice_.cells_x || j >= lattice_.cells_y) ++outside;
+            if (i + step > lattice_.cells_x || j + step > lattice_.cells_y) ++outside;
         }
     }
     present_cells_ += present;
@@ -217,20 +262,16 @@ void TileWalk::visit_leaf(Frame& frame) {
     for (int g = 0; g < n; ++g)
         count_bound(frame.id, g, own[static_cast<std::size_t>(g)],
                     tile.header.own.error_n[static_cast<std::size_t>(g)]);
+    // In the leaf's own cells; over twice the stride in finest cells the numerator is as many times larger.
     for (std::size_t above = 0; above + 1 < frames_.size(); ++above) {
         Frame& ancestor = *frames_[above];
         const LatticePoint from = lattice_.corner(ancestor.id);
-        ancestor.worst = std::max(ancestor.worst, ancestor_error(ancestor.block, ancestor.stride, corner.i - from.i,
-                                                                 corner.j - from.j, finest));
+        const std::int64_t error =
+            ancestor_error(ancestor.block, ancestor.stride >> step_log2, (corner.i - from.i) >> step_log2,
+                           (corner.j - from.j) >> step_log2, finest);
+        ancestor.worst = std::max(ancestor.worst, error << step_log2);
     }
-
-    const int texture_level = dataset_.texture_deepest_level;
-    if (texture_level <= frame.id.level) {
-        Frame& target = *frames_[static_cast<std::size_t>(texture_level)];
-        mark_present(grid_, target.id.x, target.id.y, presence, target.alpha);
-    } else {
-        frame.texture_children = visit_texture_children(frame.id, presence, frame.alpha, frame.complete);
-    }
+    mark_leaf(frame, presence);
 }
 
 void TileWalk::check_coarsest_bound(const Frame& frame) {
@@ -252,6 +293,9 @@ void TileWalk::finish_dataset() {
     if (present_cells_ != dataset_.present_cells)
         problems_.add(
             fmt::format("dataset: {} present cells, the tiles hold {}", dataset_.present_cells, present_cells_));
+    if (coarsest_leaf_ != dataset_.least_leaf_level())
+        problems_.add(fmt::format("dataset: the coarsest leaf is of level {}, the tiles' of level {}",
+                                  dataset_.least_leaf_level(), coarsest_leaf_));
     // The dataset speaks of source heights, before they were resampled and rounded.
     const double low = dataset_.height_m(lowest_n_), high = dataset_.height_m(highest_n_);
     const double slack =

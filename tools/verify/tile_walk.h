@@ -32,6 +32,11 @@ public:
     std::int64_t texture_rows() const { return texture_rows_; }
 
 private:
+    struct TextureRow {
+        bool exists = false;
+        std::optional<TextureTile> tile;  // nothing: missing or damaged
+    };
+
     struct Frame {
         TileId id;
         std::shared_ptr<const HeightTile> tile;
@@ -39,30 +44,35 @@ private:
         std::int64_t stride = 1;              // of that block, finest cells
         std::int64_t worst = 0;               // its true error, times 2 * stride
         bool complete = true;                 // every tile below could be read
-        AlphaRaster alpha{0};                 // levels of the texture pyramid only
+        bool textured = false;                // textures do not end above it
+        AlphaRaster alpha{0};                 // if so
         std::uint8_t texture_children = 0;
-    };
-
-    struct TextureRow {
-        bool exists = false;
-        std::optional<TextureTile> tile;  // nothing: missing or damaged
     };
 
     void visit_roots();
     bool visit(TileId id);
-    void check_header(const Frame& frame);
+    bool is_leaf(const Frame& frame) const;
+    void check_header(const Frame& frame, const Frame* parent);
+    void check_texture_end(const Frame& frame);
     void check_range(const Frame& frame);
     void compare_with_parent(const Frame& frame, const Frame& parent);
     void compare_with_neighbours(const Frame& frame);
+    void check_grading(const Frame& frame);
+    std::optional<TileId> leaf_over(TileId id);
     void compare_border(const Frame& frame, TileId neighbour, int from_i, int from_j, int step_i, int step_j, int count,
                         int across_i, int across_j);
     void visit_leaf(Frame& frame);
+    void mark_leaf(Frame& frame, const CellPresence& presence);
     void check_coarsest_bound(const Frame& frame);
     void count_bound(TileId id, int geomip, const ExactError& truth, float stored);
     void finish_dataset();
 
     void check_texture(const Frame& frame);
     TextureRow read_texture(TileId id);
+    /// The texture of a frame has children: the heights say so.
+    bool refined(const Frame& frame) const {
+        return frame.textured && frame.id.level < dataset_.texture_deepest_level && !frame.tile->header.texture_ends;
+    }
     void judge_texture(TileId id, const TextureRow& row, std::uint8_t child_mask, const AlphaRaster* alpha);
     std::uint8_t visit_texture_children(TileId id, const CellPresence& presence, AlphaRaster& alpha, bool& complete);
     bool visit_texture_below(TileId id, const CellPresence& presence, AlphaRaster& alpha);
@@ -79,12 +89,12 @@ private:
     ProblemList& problems_;
     std::function<bool()> tick_;
     HeightCache heights_;
-    TexelGrid grid_;
     TileRow texture_row_;
     std::vector<std::unique_ptr<Frame>> frames_;
     std::optional<Error> failure_;
     std::int64_t height_rows_ = 0, texture_rows_ = 0;
     std::int64_t present_cells_ = 0;
+    int coarsest_leaf_ = kMaxLevel + 1;
     std::int32_t lowest_n_ = kMaxHeightUnits, highest_n_ = -kMaxHeightUnits;
     bool all_read_ = true;
 };

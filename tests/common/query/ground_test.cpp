@@ -14,7 +14,7 @@ TEST(Ground, IsTheFinestSurfaceWhereCellsArePresentAndNothingElsewhere) {
     test::Random random(test::seed());
     std::int64_t present = 0, absent = 0;
     for (int world = 0; world < 40; ++world) {
-        const auto terrain = test::random_world(random);
+        const auto terrain = test::random_world(random, world % 2 == 1);
         const Dataset& d = terrain.dataset();
         auto ground = Ground::open(terrain);
         ASSERT_TRUE(ground.ok());
@@ -29,7 +29,8 @@ TEST(Ground, IsTheFinestSurfaceWhereCellsArePresentAndNothingElsewhere) {
             if (!height->has_value()) continue;
             ASSERT_NEAR((*height)->height_m, terrain.surface_m(i, j, i + u, j + v), 1e-6);
             ASSERT_EQ((*height)->error_bound_m, d.height_quantum_error_m + d.warp_error_m);
-            ASSERT_EQ((*height)->level, d.lattice.deepest_level);
+            ASSERT_EQ((*height)->level, terrain.leaf_cell(i, j).level);
+            ASSERT_TRUE((*height)->finest);
         }
     }
     EXPECT_GT(present, 5000);
@@ -64,6 +65,31 @@ TEST(Ground, AnswersEveryVertexOfAPresentCellWithItsSample) {
             }
     }
     EXPECT_GT(beside_holes, 100);
+}
+
+TEST(Ground, OnALineBetweenLeavesOfTwoDepthsTheDeeperAnswers) {
+    // The south-east quarter has every second sample, its far corner every one, the others every fourth.
+    test::WorldShape shape;
+    shape.cells_x = shape.cells_y = 32;
+    const auto heights = [](std::int64_t i, std::int64_t j) { return static_cast<int>(i * i + 7 * (j / 2 % 2)); };
+    shape.depth = test::DepthMap::path_to({3, 7, 7});
+    const test::SmallWorld world(shape, heights);
+    ASSERT_TRUE(world.tiles().at({1, 0, 1}).header.is_leaf());
+    ASSERT_TRUE(world.tiles().at({2, 2, 2}).header.is_leaf());
+    ASSERT_EQ(world.lattice().deepest_level, 3);
+    auto ground = Ground::open(world);
+    ASSERT_TRUE(ground.ok());
+    // West of i = 16 the sample at j = 22 is not stored: the coarse leaf's edge is straight there.
+    for (const auto& [j, height_m] : {std::tuple(22, 256.0 + 7), {24, 256.0}}) {
+        const auto height = (*ground)->height(world.x_m(16), world.y_m(j));
+        ASSERT_TRUE(height.ok() && height->has_value());
+        EXPECT_EQ((*height)->height_m, height_m);
+        EXPECT_EQ((*height)->level, 2);
+    }
+    const auto west = (*ground)->height(world.x_m(16 - 1e-9), world.y_m(22));
+    ASSERT_TRUE(west.ok() && west->has_value());
+    EXPECT_NEAR((*west)->height_m, 256, 1e-5);
+    EXPECT_EQ((*west)->level, 1);
 }
 
 TEST(Ground, EndsAtTheDataset) {

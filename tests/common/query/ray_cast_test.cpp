@@ -124,6 +124,13 @@ void expect_agrees_with_triangles(const SmallWorld& world, const Ray& ray, std::
     ASSERT_NEAR(p.z, hit->position.z, 1e-9 * (1 + std::abs(p.z) + hit->distance_m));
     const auto height = (*ground)->height(hit->position.x, hit->position.y);
     ASSERT_TRUE(height.ok());
+    const double stated_m = world.dataset().height_quantum_error_m + world.dataset().warp_error_m;
+    if (world.depth_varies() && hit->error_bound_m > stated_m + tolerance) {  // a step between leaves of two depths
+        if (*height) {
+            ASSERT_LE(std::abs((*height)->height_m - hit->position.z), hit->error_bound_m - stated_m + tolerance);
+        }
+        return;
+    }
     if (const auto possible = nearest_triangle(world, ray, -1e-6L); possible) {
         ASSERT_GE(hit->distance_m, *possible - 1e-4 * extent_m(world)) << "a hit before any triangle";
     }
@@ -137,7 +144,7 @@ TEST(RayCast, FindsTheFirstTriangleThatBruteForceFinds) {
     test::Random random(test::seed());
     std::int64_t hits = 0, misses = 0;
     for (int w = 0; w < 60; ++w) {
-        const SmallWorld world = test::random_world(random);
+        const SmallWorld world = test::random_world(random, w % 2 == 1);
         for (int k = 0; k < 60; ++k) {
             Ray ray = from_to(random_point(random, world, k % 2), random_point(random, world, 0));
             if (k % 7 == 0) ray.direction.z = 0;
@@ -173,7 +180,7 @@ TEST(RayCast, NeverPassesFromOneSideToTheOther) {
     test::Random random(test::seed() + 1);
     std::int64_t crossings = 0;
     for (int w = 0; w < 60; ++w) {
-        const SmallWorld world = test::random_world(random);
+        const SmallWorld world = test::random_world(random, w % 2 == 1);
         const Lattice& l = world.lattice();
         auto ground = Ground::open(world);
         ASSERT_TRUE(ground.ok());

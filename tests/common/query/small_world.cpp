@@ -35,7 +35,7 @@ double in_cell(bool even, double nw, double ne, double sw, double se, double u, 
 }  // namespace
 
 SmallWorld::SmallWorld(const WorldShape& s, Heights heights, Presence presence)
-    : heights_(std::move(heights)), presence_(std::move(presence)) {
+    : heights_(std::move(heights)), presence_(std::move(presence)), depth_(s.depth) {
     auto lattice = make_lattice(s.origin_x_m, s.origin_y_m, s.spacing_m, s.cells_x, s.cells_y, s.tile_cells_log2);
     EXPECT_TRUE(lattice.ok());
     dataset_.lattice = *lattice;
@@ -52,23 +52,50 @@ Result<std::unique_ptr<TileReader>> SmallWorld::open_reader() const {
     return std::unique_ptr<TileReader>(new SmallReader(*this));
 }
 
-bool SmallWorld::present(std::int64_t i, std::int64_t j) const {
+bool SmallWorld::source_present(std::int64_t i, std::int64_t j) const {
     return i >= 0 && j >= 0 && i < lattice().cells_x && j < lattice().cells_y && (!presence_ || presence_(i, j));
+}
+
+bool SmallWorld::present(std::int64_t i, std::int64_t j) const {
+    if (!source_present(i, j)) return false;
+    const LeafCell cell = leaf_cell(i, j);
+    for (std::int64_t v = cell.j; v < cell.j + cell.side; ++v)
+        for (std::int64_t u = cell.i; u < cell.i + cell.side; ++u)
+            if (!source_present(u, v)) return false;
+    return true;
+}
+
+SmallWorld::LeafCell SmallWorld::leaf_cell(std::int64_t ci, std::int64_t cj) const {
+    const Lattice& l = lattice();
+    const TileId deepest{l.deepest_level, ci >> l.tile_cells_log2, cj >> l.tile_cells_log2};
+    int level = 0;
+    while (level < l.deepest_level && depth_.refined(ancestor_at(deepest, level))) ++level;
+    const std::int64_t side = l.step(level);
+    return {level, ci / side * side, cj / side * side, side};
 }
 
 Vector3 SmallWorld::vertex(std::int64_t i, std::int64_t j) const {
     return {x_m(static_cast<double>(i)), y_m(static_cast<double>(j)), height_m(i, j)};
 }
 
-std::array<std::array<Vector3, 3>, 2> SmallWorld::triangles(std::int64_t i, std::int64_t j) const {
-    const Vector3 nw = vertex(i, j), ne = vertex(i + 1, j), sw = vertex(i, j + 1), se = vertex(i + 1, j + 1);
-    if ((i + j) % 2 == 0) return {{{nw, sw, se}, {nw, se, ne}}};
+std::array<std::array<Vector3, 3>, 2> SmallWorld::triangles(std::int64_t ci, std::int64_t cj) const {
+    const auto [level, i, j, side] = leaf_cell(ci, cj);
+    const Vector3 nw = vertex(i, j), ne = vertex(i + side, j), sw = vertex(i, j + side),
+                  se = vertex(i + side, j + side);
+    if ((i / side + j / side) % 2 == 0) return {{{nw, sw, se}, {nw, se, ne}}};
     return {{{nw, sw, ne}, {ne, sw, se}}};
 }
 
+double SmallWorld::surface_n(std::int64_t ci, std::int64_t cj, double i, double j) const {
+    const auto [level, wi, nj, side] = leaf_cell(ci, cj);
+    const auto width = static_cast<double>(side);
+    return in_cell((wi / side + nj / side) % 2 == 0, heights_(wi, nj), heights_(wi + side, nj), heights_(wi, nj + side),
+                   heights_(wi + side, nj + side), (i - static_cast<double>(wi)) / width,
+                   (j - static_cast<double>(nj)) / width);
+}
+
 double SmallWorld::surface_m(std::int64_t ci, std::int64_t cj, double i, double j) const {
-    return in_cell((ci + cj) % 2 == 0, height_m(ci, cj), height_m(ci + 1, cj), height_m(ci, cj + 1),
-                   height_m(ci + 1, cj + 1), i - static_cast<double>(ci), j - static_cast<double>(cj));
+    return dataset_.height_m(surface_n(ci, cj, i, j));
 }
 
 // Greatest distance of the tile's surface, drawn whole, to the finest one at any vertex of a present cell.
@@ -90,13 +117,16 @@ float SmallWorld::own_error(TileId id, const HeightTile& tile) const {
                     in_cell((c + r) % 2 == 0, sample(c, r), sample(c + 1, r), sample(c, r + 1), sample(c + 1, r + 1),
                             static_cast<double>(vi - c * step) / static_cast<double>(step),
                             static_cast<double>(vj - r * step) / static_cast<double>(step));
-                worst = std::max(worst, std::abs(z - heights_(corner.i + vi, corner.j + vj)));
+                worst = std::max(worst,
+                                 std::abs(z - surface_n(corner.i + i, corner.j + j, static_cast<double>(corner.i + vi),
+                                                        static_cast<double>(corner.j + vj))));
             }
         }
     return std::nextafter(static_cast<float>(worst), INFINITY);
 }
 
 bool SmallWorld::make_tile(TileId id) {
+    if (!depth_.exists(id)) return false;
     const Lattice& l = lattice();
     const std::int64_t m = l.tile_cells(), step = l.step(id.level);
     const LatticePoint corner = l.corner(id);
@@ -107,9 +137,10 @@ bool SmallWorld::make_tile(TileId id) {
     HeightBounds& own = tile.header.own;
     own.min_n = *std::min_element(tile.samples.begin(), tile.samples.end());
     own.max_n = *std::max_element(tile.samples.begin(), tile.samples.end());
-    if (id.level == l.deepest_level) {
+    if (id.level == l.deepest_level || !depth_.refined(id)) {
         for (std::int64_t r = 0; r < m; ++r)
-            for (std::int64_t c = 0; c < m; ++c) tile.presence.push_back(present(corner.i + c, corner.j + r) ? 1 : 0);
+            for (std::int64_t c = 0; c < m; ++c)
+                tile.presence.push_back(present(corner.i + c * step, corner.j + r * step) ? 1 : 0);
         const auto cells = std::count(tile.presence.begin(), tile.presence.end(), 1);
         if (cells == 0) return false;
         if (cells == m * m) tile.presence.clear();
@@ -119,6 +150,8 @@ bool SmallWorld::make_tile(TileId id) {
             const auto child = tiles_.find(child_of(id, q));
             if (child == tiles_.end()) continue;
             tile.header.child_mask = static_cast<std::uint8_t>(tile.header.child_mask | 1 << q);
+            if (child->second.header.is_leaf() && id.level + 1 < l.deepest_level)
+                tile.header.leaf_mask = static_cast<std::uint8_t>(tile.header.leaf_mask | 1 << q);
             HeightBounds& bounds = tile.header.children[static_cast<std::size_t>(q)];
             bounds = child->second.header.own;
             own.min_n = std::min(own.min_n, bounds.min_n);
@@ -136,7 +169,7 @@ bool SmallWorld::make_tile(TileId id) {
     return true;
 }
 
-SmallWorld random_world(Random& random) {
+SmallWorld random_world(Random& random, bool varying) {
     WorldShape s;
     s.tile_cells_log2 = uniform(random, 2, 3);
     s.cells_x = uniform(random, 1, 40);
@@ -168,6 +201,11 @@ SmallWorld random_world(Random& random) {
     const auto presence = [=](std::int64_t i, std::int64_t j) {
         return (i == 0 && j == 0) || mask[static_cast<std::size_t>(j / patch * 64 + i / patch)] != 0;
     };
+    if (varying) {
+        const auto lattice = make_lattice(0, 0, 1, s.cells_x, s.cells_y, s.tile_cells_log2);
+        EXPECT_TRUE(lattice.ok());
+        s.depth = DepthMap::random(random, *lattice, lattice->deepest_level, true);
+    }
     return SmallWorld(s, heights, presence);
 }
 

@@ -1,5 +1,6 @@
 // SmallWorld: a height pyramid in memory, behind TileStore, with exact errors by brute force; and an independent
-// reading of its finest surface, triangle by triangle. PartialSource: any subset of its tiles.
+// reading of its finest surface, triangle by triangle, each cell as large as its leaf has it. PartialSource: any subset
+// of its tiles.
 #pragma once
 
 #include <functional>
@@ -10,6 +11,7 @@
 #include "common/query/height_source.h"
 #include "common/query/ray_cast.h"
 #include "common/store/tile_store.h"
+#include "tests/common/depth_map.h"
 #include "tests/common/test_support.h"
 
 namespace scree::test {
@@ -19,6 +21,7 @@ struct WorldShape {
     std::int64_t cells_x = 16, cells_y = 16;
     double origin_x_m = 0, origin_y_m = 0, spacing_m = 1, height_offset_m = 0, quantum_m = 1;
     double quantum_error_m = 0, warp_error_m = 0;
+    DepthMap depth;
 };
 
 class SmallWorld final : public TileStore {
@@ -36,29 +39,41 @@ public:
     std::set<TileId> lost, cut;
     mutable std::int64_t reads = 0;
 
+    /// Of finest cell (i, j): whether it lies in a present cell of its leaf.
     bool present(std::int64_t i, std::int64_t j) const;
+    bool depth_varies() const { return depth_.varies(); }
+    /// Of the leaf over a finest cell, stored or not: its level, and the north-west corner and side of its cell there.
+    struct LeafCell {
+        int level = 0;
+        std::int64_t i = 0, j = 0, side = 1;
+    };
+    LeafCell leaf_cell(std::int64_t ci, std::int64_t cj) const;
     double x_m(double i) const { return lattice().x_m(i); }
     double y_m(double j) const { return lattice().y_m(j); }
     double height_m(std::int64_t i, std::int64_t j) const { return dataset_.height_m(heights_(i, j)); }
     /// A corner of the lattice as a point.
     Vector3 vertex(std::int64_t i, std::int64_t j) const;
-    /// The two triangles of a cell, by the rule: split from (i, j) to (i+1, j+1) iff i + j is even.
+    /// The two triangles of the leaf's cell over a finest cell, by the rule: split from (i, j) to (i+1, j+1) iff i + j
+    /// is even, in the leaf's units.
     std::array<std::array<Vector3, 3>, 2> triangles(std::int64_t i, std::int64_t j) const;
     /// Height of the finest surface at lattice position (i, j) inside cell (ci, cj).
     double surface_m(std::int64_t ci, std::int64_t cj, double i, double j) const;
 
 private:
+    bool source_present(std::int64_t i, std::int64_t j) const;
+    double surface_n(std::int64_t ci, std::int64_t cj, double i, double j) const;
     bool make_tile(TileId id);
     float own_error(TileId id, const HeightTile& tile) const;
 
     Dataset dataset_;
     Heights heights_;
     Presence presence_;
+    DepthMap depth_;
     std::map<TileId, HeightTile> tiles_;
 };
 
-/// Sizes, places, heights and holes at random; some with several roots.
-SmallWorld random_world(Random& random);
+/// Sizes, places, heights and holes at random; some with several roots. `varying`: depths too.
+SmallWorld random_world(Random& random, bool varying = false);
 
 class PartialSource final : public HeightSource {
 public:

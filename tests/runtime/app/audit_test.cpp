@@ -4,6 +4,7 @@
 
 #include <limits>
 
+#include "common/mesh/geometric_error.h"
 #include "tests/runtime/lod/drawn_frame.h"
 #include "tests/runtime/lod/memory_store.h"
 #include "tests/runtime/lod/selection_support.h"
@@ -102,7 +103,7 @@ TEST(Audit, TheTruthNeverPassesThePromise) {
     double closest = 0;
     std::int64_t samples = 0;
     for (int world = 0; world < 30; ++world) {
-        const auto terrain = test::random_terrain(random);
+        const auto terrain = test::random_terrain(random, 0, 1, test::depth_of_world(world));
         Audited a(terrain);
         for (int k = 0; k < 12; ++k) {
             const Camera camera = test::random_camera(random, terrain);
@@ -156,6 +157,34 @@ TEST(Audit, AFinestMeshHasNoErrorAndEveryPresentVertexInViewIsLookedAt) {
             }
     }
     EXPECT_EQ(errors.count(), vertices);
+}
+
+TEST(Audit, LeavesDrawnWholeHaveNoErrorWhateverTheirDepth) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    for (int world = 0; world < 10; ++world) {
+        const auto terrain = test::random_terrain(random, 0, 1, test::Depth::varying);
+        Audited a(terrain);
+        DrawList leaves;
+        std::int64_t vertices = 0;
+        const std::int64_t m = terrain.lattice().tile_cells();
+        for (const TileId id : terrain.tiles()) {
+            if (!terrain.is_leaf(id)) continue;
+            DrawItem item;
+            item.tile = id;
+            item.height_slot = terrain.index(id);
+            leaves.push_back(item);
+            const auto present = present_vertices(terrain.tile(id)->presence, terrain.lattice().tile_cells_log2);
+            vertices += present.empty() ? (m + 1) * (m + 1) : std::count(present.begin(), present.end(), 1);
+        }
+        const Lattice& l = terrain.lattice();
+        const double i = static_cast<double>(l.cells_x) / 2, j = static_cast<double>(l.cells_y) / 2;
+        auto camera = look_at({l.x_m(i), l.y_m(j), 20000}, {l.x_m(i), l.y_m(j), 0}, 40, 800, 800);
+        ASSERT_TRUE(camera.ok());
+        const ErrorHistogram errors = a.audit(*camera, leaves);
+        EXPECT_EQ(errors.max(), 0);
+        EXPECT_EQ(errors.count(), vertices);
+    }
 }
 
 TEST(Audit, MeasuresADroppedSpikeInPixels) {

@@ -21,13 +21,15 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // The fields of docs/measuring.md, as a writer of its own sets them; a test bends one.
 struct Fields {
     std::string magic = "SCREESMP";
-    std::uint32_t version = 1, count = 1;
-    std::uint32_t name_bytes = 5;
+    std::uint32_t version = 2, count = 1;
+    std::uint32_t names = 1, name_bytes = 5;
     std::string name = "a.tif";
-    double x = 400000.5, y = 5300000.25, dx = 10, dy = 12.5;
-    std::uint64_t columns = 3, rows = 2;
+    std::uint64_t columns = 3, rows = 2, step = 2;
     std::uint32_t sample_bytes = 4;
-    std::uint64_t offset = 88;  // 16 + 4 + 5 + 60 bytes of header, and three to align
+    std::uint64_t control_offset = 80;  // 16 + 4 + 4 + 5 + 44 bytes of header, and seven to align
+    std::uint64_t offset = 80 + 64;
+    std::vector<double> controls{400000.5, 5300000.25, 400020.5, 5300000.25,
+                                 400000.5, 5299987.75, 400020.5, 5299987.75};
 };
 
 std::vector<std::uint8_t> file_of(const Fields& f, const std::vector<double>& heights) {
@@ -36,14 +38,17 @@ std::vector<std::uint8_t> file_of(const Fields& f, const std::vector<double>& he
     for (const char c : f.magic) w.u8(static_cast<std::uint8_t>(c));
     w.u32(f.version);
     w.u32(f.count);
+    w.u32(f.names);
     w.u32(f.name_bytes);
     for (const char c : f.name) w.u8(static_cast<std::uint8_t>(c));
-    for (const double v : {f.x, f.y, f.dx, f.dy}) w.f64(v);
     w.u64(f.columns);
     w.u64(f.rows);
+    w.u64(f.step);
     w.u32(f.sample_bytes);
+    w.u64(f.control_offset);
     w.u64(f.offset);
     while (out.size() % 8 != 0) w.u8(0);
+    for (const double v : f.controls) w.f64(v);
     for (const double v : heights) {
         if (f.sample_bytes == 8)
             w.f64(v);
@@ -86,22 +91,56 @@ TEST_F(SamplesFile, GivesPlaceAndHeightsOfFloatAndDouble) {
         if (sample_bytes == 8) heights[5] = 16777217.25;
         const auto samples = read(file_of(f, heights));
         ASSERT_TRUE(samples) << samples.error().message;
-        ASSERT_EQ(samples->rasters().size(), 1u);
-        const SourceRaster& r = samples->rasters()[0];
-        EXPECT_EQ(r.name, "a.tif");
-        EXPECT_EQ(r.x0, 400000.5);
-        EXPECT_EQ(r.y0, 5300000.25);
-        EXPECT_EQ(r.dx, 10);
-        EXPECT_EQ(r.dy, 12.5);
-        ASSERT_EQ(r.columns, 3);
-        ASSERT_EQ(r.rows, 2);
-        EXPECT_EQ(r.at(0, 0), 1);
-        EXPECT_EQ(r.at(1, 0), 2.5);
-        EXPECT_TRUE(std::isnan(r.at(2, 0)));
-        EXPECT_EQ(r.at(0, 1), -4);
-        EXPECT_TRUE(std::isnan(r.at(1, 1))) << "an infinity is no height";
-        EXPECT_EQ(r.at(2, 1), heights[5]);
+        ASSERT_EQ(samples->layers().size(), 1u);
+        const SourceLayer& l = samples->layers()[0];
+        EXPECT_EQ(l.names, std::vector<std::string>{"a.tif"});
+        ASSERT_EQ(l.columns, 3);
+        ASSERT_EQ(l.rows, 2);
+        EXPECT_EQ(l.position(0, 0).x, 400000.5);
+        EXPECT_EQ(l.position(0, 0).y, 5300000.25);
+        EXPECT_EQ(l.position(1, 1).x, 400010.5);
+        EXPECT_EQ(l.position(2, 1).y, 5299987.75);
+        EXPECT_EQ(l.at(0, 0), 1);
+        EXPECT_EQ(l.at(1, 0), 2.5);
+        EXPECT_TRUE(std::isnan(l.at(2, 0)));
+        EXPECT_FALSE(l.covered(2, 0));
+        EXPECT_EQ(l.at(0, 1), -4);
+        EXPECT_TRUE(std::isnan(l.at(1, 1))) << "a hidden sample is no truth";
+        EXPECT_TRUE(l.covered(1, 1)) << "but there is terrain";
+        EXPECT_EQ(l.at(2, 1), heights[5]);
     }
+}
+
+TEST_F(SamplesFile, PlacesSamplesBetweenControlPointsAndOnTheLast) {
+    Fields f;
+    f.columns = 6;
+    f.rows = 4;
+    f.step = 2;  // control columns 0, 2, 4, 5 and rows 0, 2, 3
+    const auto x = [](double c, double r) { return 100 + 10 * c + 2 * r + c * r; };
+    const auto y = [](double c, double r) { return 500 + c - 8 * r; };
+    f.controls.clear();
+    for (const double r : {0.0, 2.0, 3.0})
+        for (const double c : {0.0, 2.0, 4.0, 5.0}) {
+            f.controls.push_back(x(c, r));
+            f.controls.push_back(y(c, r));
+        }
+    f.offset = f.control_offset + f.controls.size() * 8;
+    const auto samples = read(file_of(f, std::vector<double>(24, 7)));
+    ASSERT_TRUE(samples) << samples.error().message;
+    const SourceLayer& l = samples->layers()[0];
+    ASSERT_EQ(l.control_columns(), 4);
+    ASSERT_EQ(l.control_rows(), 3);
+    for (int r = 0; r < 4; ++r)
+        for (int c = 0; c < 6; ++c) {
+            EXPECT_NEAR(l.position(c, r).x, x(c, r), 1e-9) << c << ", " << r;
+            EXPECT_NEAR(l.position(c, r).y, y(c, r), 1e-9) << c << ", " << r;
+        }
+    // A control point without a place takes the samples of its cells with it, and no others.
+    f.controls[0] = f.controls[1] = kNaN;
+    const auto torn = read(file_of(f, std::vector<double>(24, 7)));
+    ASSERT_TRUE(torn) << torn.error().message;
+    EXPECT_TRUE(std::isnan(torn->layers()[0].position(1, 1).x));
+    EXPECT_EQ(torn->layers()[0].position(2, 0).x, x(2, 0));
 }
 
 TEST_F(SamplesFile, IsReadAfterItsNameIsGone) {
@@ -110,7 +149,7 @@ TEST_F(SamplesFile, IsReadAfterItsNameIsGone) {
     std::filesystem::remove(path_);
     const SourceSamples kept = *samples;
     samples = Error{};
-    EXPECT_EQ(kept.rasters()[0].at(0, 1), -4);
+    EXPECT_EQ(kept.layers()[0].at(0, 1), -4);
 }
 
 TEST_F(SamplesFile, CutOffAnywhereIsRefused) {
@@ -125,40 +164,45 @@ TEST_F(SamplesFile, CutOffAnywhereIsRefused) {
 
 TEST_F(SamplesFile, OfAnotherKindOrVersionIsRefused) {
     expect_refused([](Fields& f) { f.magic = "SCREESMQ"; }, "not a file of samples");
-    expect_refused([](Fields& f) { f.version = 2; }, "version 2");
+    expect_refused([](Fields& f) { f.version = 1; }, "version 1");
     expect_refused([](Fields& f) { f.version = 0; }, "version 0");
-    expect_refused([](Fields& f) { f.count = 0; }, "no source");
+    expect_refused([](Fields& f) { f.count = 0; }, "no layer");
     expect_refused(std::vector<std::uint8_t>(4096, 0), "not a file of samples");
     EXPECT_FALSE(SourceSamples::open(folder_.file("missing")));
     EXPECT_FALSE(SourceSamples::open(folder_.file("")));
 }
 
 TEST_F(SamplesFile, WithFieldsThatLieIsRefused) {
-    expect_refused([](Fields& f) { f.count = 2; }, "source 2 of 2");
-    expect_refused([](Fields& f) { f.count = 0xffffffffu; }, "source 2 of");
+    expect_refused([](Fields& f) { f.count = 2; }, "layer 2 of 2");
+    expect_refused([](Fields& f) { f.count = 0xffffffffu; }, "layer 2 of");
+    expect_refused([](Fields& f) { f.names = 0; }, "a layer of 0 files");
+    expect_refused([](Fields& f) { f.names = 0xffffffffu; }, "a layer of");
     expect_refused([](Fields& f) { f.name_bytes = 0xffffffffu; }, "name");
-    for (const double spacing : {0.0, -10.0, kNaN, kInfinity, 1e-9, 1e9}) {
-        expect_refused([&](Fields& f) { f.dx = spacing; }, "spacing");
-        expect_refused([&](Fields& f) { f.dy = spacing; }, "spacing");
-    }
-    for (const double place : {kNaN, kInfinity, -kInfinity, 1e12, -1e300}) {
-        expect_refused([&](Fields& f) { f.x = place; }, "no place");
-        expect_refused([&](Fields& f) { f.y = place; }, "no place");
-    }
-    for (const std::uint64_t side : {std::uint64_t{0}, std::uint64_t{1} << 31, ~std::uint64_t{0}}) {
+    for (const double place : {kInfinity, -kInfinity, 1e12, -1e300})
+        for (std::size_t k = 0; k < 8; ++k) expect_refused([&](Fields& f) { f.controls[k] = place; }, "no place");
+    expect_refused([&](Fields& f) { f.controls[3] = kNaN; }, "no place");  // half a place
+    for (const std::uint64_t side : {std::uint64_t{0}, std::uint64_t{1}, std::uint64_t{1} << 31, ~std::uint64_t{0}}) {
         expect_refused([&](Fields& f) { f.columns = side; }, "samples; a side");
         expect_refused([&](Fields& f) { f.rows = side; }, "samples; a side");
     }
+    for (const std::uint64_t step : {std::uint64_t{0}, std::uint64_t{1} << 32, ~std::uint64_t{0}})
+        expect_refused([&](Fields& f) { f.step = step; }, "control points every");
     for (const std::uint32_t bytes : {0u, 2u, 5u, 16u, 0xffffffffu})
         expect_refused([&](Fields& f) { f.sample_bytes = bytes; }, "4 and 8");
     expect_refused([](Fields& f) { f.offset = 84; }, "multiple of 8");
-    for (const std::uint64_t offset : {std::uint64_t{0}, std::uint64_t{80}, std::uint64_t{96}, std::uint64_t{112},
-                                       std::uint64_t{120}, std::uint64_t{1} << 63, ~std::uint64_t{7}})
+    expect_refused([](Fields& f) { f.control_offset = 84; }, "multiple of 8");
+    for (const std::uint64_t offset :
+         {std::uint64_t{0}, std::uint64_t{64}, std::uint64_t{168}, std::uint64_t{1} << 63, ~std::uint64_t{7}}) {
         expect_refused([&](Fields& f) { f.offset = offset; }, "do not lie within");
+        expect_refused([&](Fields& f) { f.control_offset = offset; }, "do not lie within");
+    }
     expect_refused([](Fields& f) { f.columns = 4; }, "do not lie within");
     expect_refused([](Fields& f) { f.rows = 3; }, "do not lie within");
-    // The product of the sides and the size of a sample passes 2^62.
+    expect_refused([](Fields& f) { f.step = 1; }, "do not lie within");
+    // The products of the sides and the sizes pass 2^64.
     expect_refused([](Fields& f) { f.columns = f.rows = std::uint64_t{1} << 30; }, "do not lie within");
+    expect_refused([](Fields& f) { f.columns = f.rows = (std::uint64_t{1} << 30) + 1, f.step = 1; },
+                   "do not lie within");
 }
 
 TEST_F(SamplesFile, DamagedAtRandomIsRefusedOrReadWithinItself) {
@@ -173,9 +217,12 @@ TEST_F(SamplesFile, DamagedAtRandomIsRefusedOrReadWithinItself) {
         const auto samples = read(bytes);
         if (!samples) continue;
         ++accepted;
-        const SourceRaster& r = samples->rasters()[0];
-        for (std::int64_t row = 0; row < r.rows; ++row)
-            for (std::int64_t column = 0; column < r.columns; ++column) ASSERT_FALSE(std::isinf(r.at(column, row)));
+        const SourceLayer& l = samples->layers()[0];
+        for (std::int64_t row = 0; row < l.rows; ++row)
+            for (std::int64_t column = 0; column < l.columns; ++column) {
+                ASSERT_FALSE(std::isinf(l.at(column, row)));
+                ASSERT_FALSE(std::isinf(l.position(static_cast<double>(column), static_cast<double>(row)).x));
+            }
     }
     EXPECT_GT(accepted, 100);
 }
@@ -209,19 +256,23 @@ TEST_F(Sampling, PassesTheReadingOnToTheLetterAndMapsWhatIsWritten) {
     SamplingOptions options = program(
         "printf '%s\\n' \"$@\" > \"$(dirname \"$0\")/words\"\n"
         "cat \"$(dirname \"$0\")/ready\" >&${3#--fd=}");
+    options.crs = "EPSG:32633";
+    options.assume_crs = "+proj=utm +zone=33";
+    options.assume_same_datum = true;
     options.spacing_m = 0.1;
     options.height_scale = 1.0 / 3;
     options.height_offset_m = -5;
     options.nodata = -32767;
     const auto samples = sample_sources({"a b.tif", "-odd.tif"}, options);
     ASSERT_TRUE(samples) << samples.error().message;
-    EXPECT_EQ(samples->rasters()[0].at(0, 1), -4);
+    EXPECT_EQ(samples->layers()[0].at(0, 1), -4);
     const auto bytes = test::read_bytes(folder_.file("words"));
     std::string words(bytes.begin(), bytes.end());
     const std::size_t fd = words.find("--fd=") + 5;
     words.erase(fd, words.find('\n', fd) - fd);
     EXPECT_EQ(words,
-              "samples\n--quiet\n--fd=\n--spacing=0.1\n--height-scale=0.3333333333333333\n--height-offset=-5\n"
+              "samples\n--quiet\n--fd=\n--crs=EPSG:32633\n--assume-crs=+proj=utm "
+              "+zone=33\n--assume-same-datum\n--spacing=0.1\n--height-scale=0.3333333333333333\n--height-offset=-5\n"
               "--nodata=-32767\n--\na b.tif\n-odd.tif\n");
 }
 

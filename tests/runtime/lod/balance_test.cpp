@@ -33,9 +33,10 @@ void expect_whole(const test::SyntheticTerrain& terrain, const test::FakeResiden
 TEST(Balance, RandomCutsOverRandomResidencyAreWatertightAndDrawEveryVisibleCellOnce) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());
-    std::int64_t thinned = 0, mixed_levels = 0, refined = 0, morphed = 0, edges_apart = 0;
+    std::int64_t thinned = 0, mixed_levels = 0, refined = 0, morphed = 0, edges_apart = 0, coarse_leaves = 0;
     for (int world = 0; world < 60; ++world) {
-        const auto terrain = test::random_terrain(random, world % 4 == 3 ? test::kDeepTextures : world % 4);
+        const auto terrain = test::random_terrain(random, world % 4 == 3 ? test::kDeepTextures : world % 4, 1,
+                                                  test::depth_of_world(world / 4));
         const CpuArena arena = test::arena_of(terrain);
         const TilePatterns patterns(terrain.lattice().tile_cells_log2);
         Selector selector(terrain.dataset());
@@ -60,6 +61,7 @@ TEST(Balance, RandomCutsOverRandomResidencyAreWatertightAndDrawEveryVisibleCellO
                 thinned += item.edge_mask != 0 ? 1 : 0;
                 mixed_levels += item.tile.level != s.draws[0][0].tile.level ? 1 : 0;
                 refined += item.tile.level == terrain.lattice().deepest_level ? 1 : 0;
+                coarse_leaves += item.tile.level < terrain.lattice().deepest_level && terrain.is_leaf(item.tile);
             }
         }
     }
@@ -69,13 +71,14 @@ TEST(Balance, RandomCutsOverRandomResidencyAreWatertightAndDrawEveryVisibleCellO
     EXPECT_GT(refined, 500);
     EXPECT_GT(morphed, 1000);
     EXPECT_GT(edges_apart, 200);
+    EXPECT_GT(coarse_leaves, 500);
 }
 
 TEST(Balance, HoldsWhereOneLoneTileOfManyLevelsIsMissing) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());
-    for (int world = 0; world < 6; ++world) {
-        const auto terrain = test::random_terrain(random);
+    for (int world = 0; world < 12; ++world) {
+        const auto terrain = test::random_terrain(random, 0, 1, test::depth_of_world(world));
         const CpuArena arena = test::arena_of(terrain);
         const TilePatterns patterns(terrain.lattice().tile_cells_log2);
         Selector selector(terrain.dataset());

@@ -126,6 +126,7 @@ struct FlightKind {
     int texture_depth = 0;
     bool curved = false;
     bool morph = true;
+    test::Depth depth = test::Depth::uniform;
 };
 
 struct FlightResult {
@@ -137,7 +138,7 @@ struct FlightResult {
 FlightResult fly(test::Random& random, const FlightKind& kind, int worlds) {
     FlightResult result;
     for (int world = 0; world < worlds; ++world) {
-        const auto terrain = test::random_terrain(random, kind.texture_depth, kErrorGrowth);
+        const auto terrain = test::random_terrain(random, kind.texture_depth, kErrorGrowth, kind.depth);
         const Lattice& l = terrain.lattice();
         const double top = terrain.dataset().max_height_m, extent_m = l.spacing_m * static_cast<double>(l.cells_x);
         for (int flight = 0; flight < 3; ++flight) {
@@ -202,6 +203,24 @@ TEST(ContinuityInSpace, NoVertexPopsUnderTexturesDeeperThanTheHeights) {
     const FlightResult r = fly(random, {.texture_depth = test::kDeepTextures}, 15);
     EXPECT_EQ(r.pops, 0) << "the worst by " << r.worst_m << " m";
     EXPECT_GT(r.by_texture, 500);
+}
+
+TEST(ContinuityInSpace, NoVertexPopsWhereLeavesLieAtVariousDepths) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    const FlightResult r = fly(random, {.depth = test::Depth::varying}, 25);
+    EXPECT_EQ(r.pops, 0) << "the worst by " << r.worst_m << " m";
+    EXPECT_GT(r.mixed, 500);
+}
+
+TEST(ContinuityInSpace, NoVertexPopsUnderTexturesWhoseDepthVariesAsWell) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    for (const int texture_depth : {3, test::kDeepTextures}) {
+        const FlightResult r = fly(random, {.texture_depth = texture_depth, .depth = test::Depth::varying}, 15);
+        EXPECT_EQ(r.pops, 0) << "the worst by " << r.worst_m << " m";
+        EXPECT_GT(r.by_texture, 500);
+    }
 }
 
 TEST(ContinuityInSpace, WithoutMorphingTheSameFlightsFindPops) {

@@ -45,9 +45,9 @@ private:
             return std::numeric_limits<Level>::max();
         const Level limit = other.level + kOneLevel;
         const double finest_m = error_m(other, level_of(cut_.minimum_exponent(other)));
-        if (other.split || other.id.level < terrain_.lattice().deepest_level || allowed_m(other) >= finest_m)
-            return limit;
-        return std::min(limit, static_cast<Level>(allowed_m(other) / finest_m * kOneLevel));
+        if (other.split || !terrain_.is_leaf(other.id) || allowed_m(other) >= finest_m) return limit;
+        return std::min(limit, level_of(cut_.minimum_exponent(other)) +
+                                   static_cast<Level>(allowed_m(other) / finest_m * kOneLevel));
     }
     bool lacks_towards(const CutNode& split, const CutNode& leaf) const {
         for (int q = 0; q < 4; ++q)
@@ -74,7 +74,7 @@ TEST(Cut, NoLeafCanBeRaisedWithoutBreakingItsToleranceOrARule) {
     test::Random random(test::seed());
     std::int64_t leaves = 0, between = 0, raised_to_the_top = 0;
     for (int world = 0; world < 60; ++world) {
-        const auto terrain = test::random_terrain(random, 0, kErrorGrowth);
+        const auto terrain = test::random_terrain(random, 0, kErrorGrowth, test::depth_of_world(world));
         test::FakeResidency residency(terrain);
         residency.add_all();
         Cut cut(terrain.dataset());

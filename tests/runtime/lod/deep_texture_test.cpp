@@ -22,8 +22,9 @@ Square square_of(const Lattice& l, const DrawItem& item) {
 }
 
 struct DeepWorld {
-    explicit DeepWorld(test::Random& random)
-        : terrain(test::random_terrain(random, test::kDeepTextures)), selector(terrain.dataset()) {}
+    DeepWorld(test::Random& random, int world)
+        : terrain(test::random_terrain(random, test::kDeepTextures, 1, test::depth_of_world(world))),
+          selector(terrain.dataset()) {}
     Camera near_camera(test::Random& random) const {
         const Lattice& l = terrain.lattice();
         const auto i = test::uniform(random, 0, static_cast<int>(l.cells_x)),
@@ -44,7 +45,7 @@ TEST(DeepTextures, PartsDrawEveryPresentCellOfTheirTileOnceWithItsMesh) {
     test::Random random(test::seed());
     std::int64_t parts = 0;
     for (int world = 0; world < 12; ++world) {
-        DeepWorld w(random);
+        DeepWorld w(random, world);
         const Lattice& l = w.terrain.lattice();
         const TilePatterns patterns(l.tile_cells_log2);
         for (int k = 0; k < 10; ++k) {
@@ -85,7 +86,7 @@ TEST(DeepTextures, EachPartLiesWhereItsScaleAndOffsetSayInItsTexture) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());
     for (int world = 0; world < 10; ++world) {
-        DeepWorld w(random);
+        DeepWorld w(random, world);
         const Lattice& l = w.terrain.lattice();
         for (int k = 0; k < 10; ++k) {
             test::FakeResidency residency(w.terrain);
@@ -119,7 +120,7 @@ TEST(DeepTextures, WithEverythingResidentATexelCoversNoMorePixelsThanAllowed) {
     test::Random random(test::seed());
     std::int64_t checked = 0;
     for (int world = 0; world < 10; ++world) {
-        DeepWorld w(random);
+        DeepWorld w(random, world);
         const Lattice& l = w.terrain.lattice();
         const Dataset& d = w.terrain.dataset();
         test::FakeResidency residency(w.terrain);
@@ -133,7 +134,9 @@ TEST(DeepTextures, WithEverythingResidentATexelCoversNoMorePixelsThanAllowed) {
                 const int level = w.terrain.textures()[static_cast<std::size_t>(item.texture.slot)].level;
                 const Square q = square_of(l, item);
                 // One block of cells is the smallest part; a deeper texture cannot be drawn.
-                if (level == d.texture_deepest_level || q.side == 2 || item.tile.level < l.deepest_level) continue;
+                if (level == d.texture_deepest_level || q.side == 2 * l.step(item.tile.level) ||
+                    !w.terrain.is_leaf(item.tile))
+                    continue;
                 if (level != item.tile.level + item.part.level) continue;
                 const TileId own = w.terrain.textures()[static_cast<std::size_t>(item.texture.slot)];
                 for (int quadrant = 0; quadrant < 4; ++quadrant) {
@@ -182,6 +185,42 @@ TEST(DeepTextures, APartReachesNoFurtherThanTheDataDoesSoThatNoPartIsMoreUrgentT
                 ASSERT_TRUE(planned.contains(parent_of(id)))
                     << "with " << slots << " slots, texture of level " << id.level;
             }
+    }
+}
+
+// Fine imagery of one corner over coarse imagery of the rest, on flat ground: pages are split for it there alone, and
+// no texture is asked for that is not stored.
+TEST(DeepTextures, FineImageryOfOnePlaceSplitsNoPagesElsewhere) {
+    test::TerrainShape shape;
+    shape.tile_cells_log2 = 3;
+    shape.cells_x = shape.cells_y = 128;
+    shape.texture_depth = 4;
+    const Lattice l = *make_lattice(0, 0, 1, 128, 128, 3);
+    ASSERT_EQ(l.deepest_level, 4);
+    shape.texture_depth_map = test::DepthMap::path_to({4, 15, 15});
+    const test::SyntheticTerrain terrain(shape, [](std::int64_t, std::int64_t) { return 0; });
+    ASSERT_EQ(terrain.textures().size(), 17u);
+    Selector selector(terrain.dataset());
+    for (const bool with_textures : {true, false}) {
+        test::FakeResidency residency(terrain);
+        for (const TileId id : terrain.tiles()) residency.add(id);
+        residency.add_texture({0, 0, 0});
+        if (with_textures) residency.add_all();
+        const auto look_down = [&](double i, double j) -> const Selection& {
+            const Lattice& at = terrain.lattice();
+            auto camera = look_at({at.x_m(i), at.y_m(j), 60}, {at.x_m(i), at.y_m(j) + 0.1, 50}, 40, 800, 800);
+            EXPECT_TRUE(camera.ok());
+            SelectionSettings settings = test::with_tau(1);
+            settings.texture_tau_px = 0.01;
+            return selector.select({&*camera, 1}, settings, residency);
+        };
+        for (const DrawItem& item : look_down(20, 20).draws[0]) EXPECT_EQ(item.tile.level, 1);
+        int finest = 0;
+        const Selection& s = look_down(124, 124);
+        for (const DrawItem& item : s.draws[0]) finest = std::max(finest, item.tile.level);
+        EXPECT_EQ(finest, 4);
+        for (const TileRequest& request : s.requests) EXPECT_TRUE(terrain.has_texture(request.id));
+        EXPECT_EQ(s.complete, with_textures);
     }
 }
 

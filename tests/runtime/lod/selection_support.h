@@ -124,7 +124,7 @@ inline double bound_px(const SyntheticTerrain& terrain, const Camera& camera, co
     const double drawn = error_m(item.geomip), coarser = error_m(std::min(item.geomip + 1, l.tile_cells_log2 - 1));
     const double inner = item.morph;
     double eps = (1 - inner) * drawn + inner * coarser;
-    if (exponent_of_item(l, item) == 0 && item.edge_mask == 0) {
+    if (item.geomip == 0 && terrain.is_leaf(item.tile) && item.edge_mask == 0) {
         // The finest surface is exact; only an edge that has moved further than the rest is on its way to thinned.
         double edge = inner;
         for (const float weight : item.edge_morph) edge = std::max(edge, static_cast<double>(weight));

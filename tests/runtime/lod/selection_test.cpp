@@ -22,7 +22,8 @@ TEST(Selection, IsTheSameTwiceAndAfterAnyOtherCallsBetween) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());
     for (int world = 0; world < 30; ++world) {
-        const auto terrain = test::random_terrain(random, world % 3 == 0 ? test::kDeepTextures : 3);
+        const auto terrain =
+            test::random_terrain(random, world % 3 == 0 ? test::kDeepTextures : 3, 1, test::depth_of_world(world));
         Selector selector(terrain.dataset());
         for (int k = 0; k < 10; ++k) {
             test::FakeResidency residency(terrain);
@@ -47,7 +48,8 @@ TEST(Selection, AllocatesNothingOnceItsBuffersHaveTheirSize) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());
     for (int world = 0; world < 12; ++world) {
-        const auto terrain = test::random_terrain(random, world % 3 == 0 ? test::kDeepTextures : 3);
+        const auto terrain =
+            test::random_terrain(random, world % 3 == 0 ? test::kDeepTextures : 3, 1, test::depth_of_world(world));
         Selector selector(terrain.dataset());
         test::FakeResidency fake(terrain);
         fake.add_all();
@@ -67,7 +69,8 @@ TEST(Selection, OnceCompleteDoesNotDependOnWhatElseIsResident) {
     test::Random random(test::seed());
     int limited = 0;
     for (int world = 0; world < 50; ++world) {
-        const auto terrain = test::random_terrain(random, world % 3 == 0 ? test::kDeepTextures : 3);
+        const auto terrain =
+            test::random_terrain(random, world % 3 == 0 ? test::kDeepTextures : 3, 1, test::depth_of_world(world));
         Selector selector(terrain.dataset());
         for (int k = 0; k < 12; ++k) {
             const Camera camera = test::random_camera(random, terrain);
@@ -102,7 +105,8 @@ TEST(Selection, FillingItsRequestsLeadsFromTheRootsToTheFullCutWithinTheSlots) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());
     for (int world = 0; world < 50; ++world) {
-        const auto terrain = test::random_terrain(random, world % 2 == 0 ? test::kDeepTextures : 2);
+        const auto terrain =
+            test::random_terrain(random, world % 2 == 0 ? test::kDeepTextures : 2, 1, test::depth_of_world(world / 2));
         Selector selector(terrain.dataset());
         for (int k = 0; k < 6; ++k) {
             const Camera camera = test::random_camera(random, terrain);

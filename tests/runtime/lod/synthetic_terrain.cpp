@@ -5,6 +5,7 @@
 #include <limits>
 #include <unordered_set>
 
+#include "common/mesh/drawn_surface.h"
 #include "common/mesh/geometric_error.h"
 
 namespace scree::test {
@@ -22,7 +23,11 @@ std::uint64_t hash(std::uint64_t seed, std::int64_t a, std::int64_t b, int octav
 }  // namespace
 
 SyntheticTerrain::SyntheticTerrain(const TerrainShape& shape, HeightFunction height, PresenceFunction present)
-    : height_(std::move(height)), present_(std::move(present)), error_growth_(shape.error_growth) {
+    : height_(std::move(height)),
+      present_(std::move(present)),
+      error_growth_(shape.error_growth),
+      depth_(shape.depth),
+      texture_depth_(shape.texture_depth_map) {
     auto lattice =
         make_lattice(300000.5, 2700000.25, shape.spacing_m, shape.cells_x, shape.cells_y, shape.tile_cells_log2);
     EXPECT_TRUE(lattice.ok());
@@ -42,6 +47,11 @@ SyntheticTerrain::SyntheticTerrain(const TerrainShape& shape, HeightFunction hei
         low = std::min(low, dataset_.height_m(stored_[ids_[k]].header.own.min_n));
         high = std::max(high, dataset_.height_m(stored_[ids_[k]].header.own.max_n));
     }
+    if (depth_.varies()) map_leaves();
+    int coarsest = lattice->deepest_level;
+    for (const TileId id : ids_)
+        if (is_leaf(id)) coarsest = std::min(coarsest, id.level);
+    if (coarsest < lattice->deepest_level) dataset_.coarsest_leaf_level = coarsest;
     make_textures();
     dataset_.min_height_m = low;
     dataset_.max_height_m = high;
@@ -57,8 +67,11 @@ void SyntheticTerrain::make_textures() {
     for (std::int64_t j = 0; j < l.cells_y; ++j)
         for (std::int64_t i = 0; i < l.cells_x; ++i)
             if (present(i, j))
-                for (int level = 0; level <= dataset_.texture_deepest_level; ++level)
-                    stored.insert(ancestor_at({finest, i, j}, level));
+                for (int level = 0; level <= dataset_.texture_deepest_level; ++level) {
+                    const TileId id = ancestor_at({finest, i, j}, level);
+                    stored.insert(id);
+                    if (!texture_depth_.refined(id)) break;
+                }
     texture_ids_.assign(stored.begin(), stored.end());
     std::sort(texture_ids_.begin(), texture_ids_.end());
     for (std::size_t k = 0; k < texture_ids_.size(); ++k)
@@ -71,8 +84,86 @@ std::int32_t SyntheticTerrain::texture_index(TileId id) const {
     return found == texture_indices_.end() ? -1 : found->second;
 }
 
-bool SyntheticTerrain::present(std::int64_t i, std::int64_t j) const {
+bool SyntheticTerrain::source_present(std::int64_t i, std::int64_t j) const {
     return i >= 0 && j >= 0 && i < lattice().cells_x && j < lattice().cells_y && (!present_ || present_(i, j));
+}
+
+// A leaf's cell is present where all of the source is.
+bool SyntheticTerrain::cell_present(std::int64_t i, std::int64_t j, std::int64_t step) const {
+    for (std::int64_t v = j; v < j + step; ++v)
+        for (std::int64_t u = i; u < i + step; ++u)
+            if (!source_present(u, v)) return false;
+    return true;
+}
+
+std::optional<TileId> SyntheticTerrain::leaf_over(std::int64_t i, std::int64_t j) const {
+    const Lattice& l = lattice();
+    const std::int64_t width = l.root_columns * l.tile_extent(0), height = l.root_rows * l.tile_extent(0);
+    if (i < 0 || j < 0 || i >= width || j >= height) return std::nullopt;
+    if (!depth_.varies()) {
+        const TileId id{l.deepest_level, i >> l.tile_cells_log2, j >> l.tile_cells_log2};
+        return tile(id) != nullptr ? std::optional(id) : std::nullopt;
+    }
+    const std::int32_t leaf = leaves_[static_cast<std::size_t>(j * width + i)];
+    return leaf < 0 ? std::nullopt : std::optional(ids_[static_cast<std::size_t>(leaf)]);
+}
+
+void SyntheticTerrain::map_leaves() {
+    const Lattice& l = lattice();
+    const std::int64_t width = l.root_columns * l.tile_extent(0), height = l.root_rows * l.tile_extent(0);
+    leaves_.assign(static_cast<std::size_t>(width * height), -1);
+    for (std::size_t k = 0; k < ids_.size(); ++k) {
+        if (!is_leaf(ids_[k])) continue;
+        const LatticePoint corner = l.corner(ids_[k]);
+        const std::int64_t extent = l.tile_extent(ids_[k].level);
+        for (std::int64_t j = corner.j; j < corner.j + extent; ++j)
+            std::fill_n(leaves_.begin() + (j * width + corner.i), extent, static_cast<std::int32_t>(k));
+    }
+}
+
+bool SyntheticTerrain::present(std::int64_t i, std::int64_t j) const {
+    if (!depth_.varies()) return source_present(i, j);
+    const auto leaf = leaf_over(i, j);
+    if (!leaf) return false;
+    const LatticePoint corner = lattice().corner(*leaf);
+    const std::int64_t step = lattice().step(leaf->level), m = lattice().tile_cells();
+    const std::vector<std::uint8_t>& cells = tile(*leaf)->presence;
+    return cells.empty() || cells[static_cast<std::size_t>((j - corner.j) / step * m + (i - corner.i) / step)] != 0;
+}
+
+double SyntheticTerrain::height_m(std::int64_t i, std::int64_t j) const {
+    if (!depth_.varies()) return dataset_.height_m(height_(i, j));
+    // Any leaf that touches the place; the one before a border as well as the one after.
+    for (const std::int64_t cj : {j, j - 1})
+        for (const std::int64_t ci : {i, i - 1})
+            if (const auto leaf = leaf_over(ci, cj)) {
+                const LatticePoint corner = lattice().corner(*leaf);
+                return dataset_.height_m(drawn_height(tile(*leaf)->samples, lattice().tile_cells_log2, {}, i - corner.i,
+                                                      j - corner.j, lattice().step(leaf->level))
+                                             .quanta());
+            }
+    return dataset_.height_m(height_(i, j));
+}
+
+bool SyntheticTerrain::beside_coarser_leaf(TileId id) const {
+    const LatticePoint c = lattice().corner(id);
+    const std::int64_t extent = lattice().tile_extent(id.level);
+    for (const LatticePoint beside : {LatticePoint{c.i - 1, c.j}, LatticePoint{c.i, c.j - 1},
+                                      LatticePoint{c.i + extent, c.j}, LatticePoint{c.i, c.j + extent}})
+        if (const auto leaf = leaf_over(beside.i, beside.j); leaf && leaf->level < id.level) return true;
+    return false;
+}
+
+bool SyntheticTerrain::texture_ends(TileId id) const {
+    return id.level < dataset_.texture_deepest_level && !(texture_depth_.exists(id) && texture_depth_.refined(id));
+}
+
+template <class Visit>
+void SyntheticTerrain::for_each_leaf(TileId id, const Visit& visit) const {
+    const auto found = stored_.find(id);
+    if (found == stored_.end()) return;
+    if (found->second.header.is_leaf()) return visit(id, found->second);
+    for (int q = 0; q < 4; ++q) for_each_leaf(child_of(id, q), visit);
 }
 
 void SyntheticTerrain::grow_errors(HeightBounds& bounds) const {
@@ -80,7 +171,29 @@ void SyntheticTerrain::grow_errors(HeightBounds& bounds) const {
         bounds.error_n[g] = std::max(bounds.error_n[g], error_growth_ * bounds.error_n[g - 1]);
 }
 
+bool SyntheticTerrain::make_leaf(TileId id, HeightTile& tile) {
+    const int n = lattice().tile_cells_log2;
+    const std::int64_t m = lattice().tile_cells(), step = lattice().step(id.level);
+    const LatticePoint corner = lattice().corner(id);
+    std::int64_t cells = 0;
+    for (std::int64_t r = 0; r < m; ++r)
+        for (std::int64_t c = 0; c < m; ++c) {
+            tile.presence.push_back(cell_present(corner.i + c * step, corner.j + r * step, step) ? 1 : 0);
+            cells += tile.presence.back();
+        }
+    if (cells == 0) return false;
+    dataset_.present_cells += cells;
+    if (cells == m * m) tile.presence.clear();
+    const auto vertices = present_vertices(tile.presence, n);
+    const auto errors = leaf_errors({tile.samples.data(), vertices.empty() ? nullptr : vertices.data(), n});
+    HeightBounds& own = tile.header.own;
+    for (std::size_t g = 0; g < errors.size(); ++g) own.error_n[g] = round_up_to_float(errors[g]);
+    grow_errors(own);
+    return true;
+}
+
 bool SyntheticTerrain::make_tile(TileId id) {
+    if (!depth_.exists(id)) return false;
     const Lattice& l = lattice();
     const int n = l.tile_cells_log2;
     const std::int64_t m = l.tile_cells(), step = l.step(id.level);
@@ -91,20 +204,9 @@ bool SyntheticTerrain::make_tile(TileId id) {
     HeightBounds& own = tile.header.own;
     own.min_n = *std::min_element(tile.samples.begin(), tile.samples.end());
     own.max_n = *std::max_element(tile.samples.begin(), tile.samples.end());
-    if (id.level == l.deepest_level) {
-        std::int64_t cells = 0;
-        for (std::int64_t r = 0; r < m; ++r)
-            for (std::int64_t c = 0; c < m; ++c) {
-                tile.presence.push_back(present(corner.i + c, corner.j + r) ? 1 : 0);
-                cells += tile.presence.back();
-            }
-        if (cells == 0) return false;
-        dataset_.present_cells += cells;
-        if (cells == m * m) tile.presence.clear();
-        const auto vertices = present_vertices(tile.presence, n);
-        const auto errors = leaf_errors({tile.samples.data(), vertices.empty() ? nullptr : vertices.data(), n});
-        for (std::size_t g = 0; g < errors.size(); ++g) own.error_n[g] = round_up_to_float(errors[g]);
-        grow_errors(own);
+    tile.header.texture_ends = texture_ends(id);
+    if (id.level == l.deepest_level || !depth_.refined(id)) {
+        if (!make_leaf(id, tile)) return false;
         stored_.emplace(id, std::move(tile));
         return true;
     }
@@ -112,30 +214,34 @@ bool SyntheticTerrain::make_tile(TileId id) {
         const auto child = stored_.find(child_of(id, q));
         if (child == stored_.end()) continue;
         const HeightBounds& bounds = child->second.header.own;
-        tile.header.child_mask = static_cast<std::uint8_t>(tile.header.child_mask | 1 << q);
+        const unsigned bit = 1u << q;
+        tile.header.child_mask = static_cast<std::uint8_t>(tile.header.child_mask | bit);
+        if (child->second.header.is_leaf() && id.level + 1 < l.deepest_level)
+            tile.header.leaf_mask = static_cast<std::uint8_t>(tile.header.leaf_mask | bit);
+        if (child->second.header.texture_ends)
+            tile.header.texture_end_mask = static_cast<std::uint8_t>(tile.header.texture_end_mask | bit);
         tile.header.children[static_cast<std::size_t>(q)] = bounds;
         own.min_n = std::min(own.min_n, bounds.min_n);
         own.max_n = std::max(own.max_n, bounds.max_n);
         for (std::size_t g = 0; g + 1 < static_cast<std::size_t>(n); ++g)
             own.error_n[g] = std::max(own.error_n[g], bounds.error_n[g + 1]);
     }
-    if (tile.header.child_mask == 0) return false;
-    // The coarsest surface is one block: compared with every deepest tile under it.
+    if (tile.header.is_leaf()) return false;
+    // The coarsest surface is one block: compared with every leaf under it, in the leaf's own cells.
     BlockVertices block{};
     for (std::int64_t k = 0; k < 9; ++k)
         block[static_cast<std::size_t>(k)] = tile.samples[static_cast<std::size_t>((k / 3 * (m + 1) + k % 3) * m / 2)];
     double worst = 0;
-    const int up = l.deepest_level - id.level;
-    for (std::int64_t y = id.y << up; y < (id.y + 1) << up; ++y)
-        for (std::int64_t x = id.x << up; x < (id.x + 1) << up; ++x) {
-            const auto leaf = stored_.find({l.deepest_level, x, y});
-            if (leaf == stored_.end()) continue;
-            const auto vertices = present_vertices(leaf->second.presence, n);
+    for (int q = 0; q < 4; ++q)
+        for_each_leaf(child_of(id, q), [&](TileId at, const HeightTile& leaf) {
+            const std::int64_t cell = l.step(at.level);
+            const LatticePoint from = l.corner(at);
+            const auto vertices = present_vertices(leaf.presence, n);
             worst = std::max(
-                worst,
-                coarse_block_error(block, l.tile_extent(id.level) / 2, x * m - corner.i, y * m - corner.j,
-                                   {leaf->second.samples.data(), vertices.empty() ? nullptr : vertices.data(), n}));
-        }
+                worst, coarse_block_error(block, l.tile_extent(id.level) / 2 / cell, (from.i - corner.i) / cell,
+                                          (from.j - corner.j) / cell,
+                                          {leaf.samples.data(), vertices.empty() ? nullptr : vertices.data(), n}));
+        });
     own.error_n[static_cast<std::size_t>(n - 1)] = round_up_to_float(worst);
     grow_errors(own);
     stored_.emplace(id, std::move(tile));
@@ -212,7 +318,7 @@ PresenceFunction with_absent_discs(Random& random, const TerrainShape& shape, in
     };
 }
 
-SyntheticTerrain random_terrain(Random& random, int texture_depth, float error_growth) {
+SyntheticTerrain random_terrain(Random& random, int texture_depth, float error_growth, Depth depth) {
     TerrainShape shape;
     shape.error_growth = error_growth;
     shape.tile_cells_log2 = uniform(random, 2, 4);
@@ -233,6 +339,13 @@ SyntheticTerrain random_terrain(Random& random, int texture_depth, float error_g
         return rough(i, j);
     };
     const int discs = uniform(random, 0, 3);
+    if (depth == Depth::varying) {
+        const auto lattice = make_lattice(0, 0, 1, shape.cells_x, shape.cells_y, shape.tile_cells_log2);
+        EXPECT_TRUE(lattice.ok());
+        shape.depth = DepthMap::random(random, *lattice, lattice->deepest_level, true);
+        const int textures = std::min(texture_depth, lattice->deepest_level + shape.tile_cells_log2);
+        shape.texture_depth_map = DepthMap::random(random, *lattice, textures, false);
+    }
     return SyntheticTerrain(shape, heights, discs > 0 ? with_absent_discs(random, shape, discs) : PresenceFunction{});
 }
 

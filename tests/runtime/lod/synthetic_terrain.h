@@ -1,10 +1,12 @@
 // SyntheticTerrain: a whole height and texture pyramid in memory, with the certified errors of common/mesh, made from
-// any function of the lattice. FakeResidency: the tables over any subset of its tiles.
+// any function of the lattice, of one depth or of depths that vary by place. FakeResidency: the tables over any subset
+// of its tiles.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <unordered_map>
 #include <vector>
 
@@ -14,6 +16,7 @@
 #include "runtime/paging/residency.h"
 #include "runtime/view/camera.h"
 #include "runtime/view/frustum.h"
+#include "tests/common/depth_map.h"
 #include "tests/common/test_support.h"
 
 namespace scree::test {
@@ -34,6 +37,8 @@ struct TerrainShape {
     int texture_size_log2 = 4;
     /// Certified errors grow by this factor at least from stride to stride (raising them is safe).
     float error_growth = 1;
+    DepthMap depth;              ///< of the heights; leaves above the deepest level hold every 2^k-th sample
+    DepthMap texture_depth_map;  ///< up to texture_depth
 };
 
 class SyntheticTerrain {
@@ -53,22 +58,38 @@ public:
     bool has_texture(TileId id) const { return texture_index(id) >= 0; }
     std::uint8_t texture_children(TileId id) const;  ///< child bits
     TextureTile texture(TileId id) const;
+    /// Whether finest cell (i, j) lies in a present cell of its leaf.
     bool present(std::int64_t i, std::int64_t j) const;
-    double height_m(std::int64_t i, std::int64_t j) const { return dataset_.height_m(height_(i, j)); }
+    /// The leaf over finest cell (i, j); nullopt where none is stored.
+    std::optional<TileId> leaf_over(std::int64_t i, std::int64_t j) const;
+    /// Of the finest stored surface at a place of the finest lattice.
+    double height_m(std::int64_t i, std::int64_t j) const;
     Box box_of(TileId id) const;
+    bool is_leaf(TileId id) const { return tile(id) != nullptr && tile(id)->header.is_leaf(); }
+    /// A coarser leaf shares an edge with this tile.
+    bool beside_coarser_leaf(TileId id) const;
 
 private:
+    bool source_present(std::int64_t i, std::int64_t j) const;
+    bool cell_present(std::int64_t i, std::int64_t j, std::int64_t step) const;
+    bool texture_ends(TileId id) const;
+    template <class Visit>
+    void for_each_leaf(TileId id, const Visit& visit) const;
     bool make_tile(TileId id);
+    bool make_leaf(TileId id, HeightTile& tile);
     void grow_errors(HeightBounds& bounds) const;
+    void map_leaves();
     void make_textures();
 
     Dataset dataset_;
     HeightFunction height_;
     PresenceFunction present_;
     float error_growth_;
+    DepthMap depth_, texture_depth_;
     std::unordered_map<TileId, HeightTile, TileIdHash> stored_;
     std::unordered_map<TileId, std::int32_t, TileIdHash> indices_, texture_indices_;
     std::vector<TileId> ids_, texture_ids_;
+    std::vector<std::int32_t> leaves_;  ///< by finest cell: index of the leaf over it, -1; where depth varies
 };
 
 /// Rough ground from integer noise of several wavelengths, -amplitude..amplitude quanta.
@@ -76,7 +97,11 @@ HeightFunction rough_heights(std::uint64_t seed, int amplitude);
 /// Absent discs over a part of the extent.
 PresenceFunction with_absent_discs(Random& random, const TerrainShape& shape, int discs);
 /// Of all sizes, with and without absent areas, one or several roots; heights from smooth to white noise.
-SyntheticTerrain random_terrain(Random& random, int texture_depth = 0, float error_growth = 1);
+enum class Depth { uniform, varying };
+SyntheticTerrain random_terrain(Random& random, int texture_depth = 0, float error_growth = 1,
+                                Depth depth = Depth::uniform);
+/// Every other world.
+inline Depth depth_of_world(int world) { return world % 2 == 0 ? Depth::uniform : Depth::varying; }
 inline constexpr int kDeepTextures = 99;  ///< for texture_depth: as deep as can be
 /// Anywhere in, over or beside the terrain, looking at a point of it.
 Camera random_camera(Random& random, const SyntheticTerrain& terrain);

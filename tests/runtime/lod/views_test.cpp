@@ -15,7 +15,7 @@ TEST(Views, EachListIsWhatTheViewMaySeeOfOneCommonBalancedCut) {
     test::Random random(test::seed());
     std::int64_t shared = 0, only_one = 0;
     for (int world = 0; world < 40; ++world) {
-        const auto terrain = test::random_terrain(random, world % 2);
+        const auto terrain = test::random_terrain(random, world % 2, 1, test::depth_of_world(world / 2));
         Selector selector(terrain.dataset());
         for (int k = 0; k < 12; ++k) {
             test::FakeResidency residency(terrain);

@@ -117,6 +117,41 @@ TEST(HeightSpool, RowsLongerThanAReadAheadCome) {
 
 TEST(HeightSpool, WideValuesKeepEveryBit) { expect_spooled({{16777217, -123456789.125}, {0.1, 2147483647}}, true); }
 
+TEST(HeightSpool, VoidAndUncoveredSamplesStayApart) {
+    const test::TemporaryFolder folder;
+    for (const bool wide : {false, true}) {
+        auto spool = HeightSpool::create(folder.file("heights"), 6, 2, wide);
+        ASSERT_TRUE(spool);
+        ASSERT_TRUE((*spool)->append(std::vector<double>{2, kUncoveredSample, kVoid, INFINITY, 7, kVoid}));
+        ASSERT_TRUE((*spool)->append(std::vector<double>{1, 2, 3, 4, 5, 6}));
+        auto summary = (*spool)->finish();
+        ASSERT_TRUE(summary);
+        EXPECT_EQ(summary->valid_samples, 8);
+        EXPECT_EQ(summary->min_raw, 1);
+        EXPECT_EQ(summary->max_raw, 7);
+        std::vector<double> samples(5);
+        ASSERT_TRUE((*spool)->read_samples(1, 0, samples));
+        EXPECT_EQ(samples[0], kUncoveredSample);
+        for (const std::size_t i : {1u, 2u, 4u}) EXPECT_TRUE(std::isnan(samples[i])) << i;
+        EXPECT_EQ(samples[3], 7);
+        EXPECT_TRUE((*spool)->may_lack_samples(0));
+        EXPECT_FALSE((*spool)->may_lack_samples(1));
+        std::vector<double> values(6);
+        std::vector<std::uint8_t> valid(6);
+        ASSERT_TRUE((*spool)->read_row(0, values, valid));
+        EXPECT_EQ(values, (std::vector<double>{2, 3.25, 4.5, 5.75, 7, 7}));
+        EXPECT_EQ(valid, (std::vector<std::uint8_t>{1, 0, 0, 0, 1, 0}));
+
+        const std::vector<double> late{-4, 12};
+        ASSERT_TRUE((*spool)->write_samples(2, 0, late));
+        ASSERT_TRUE((*spool)->read_row(0, values, valid));
+        EXPECT_EQ(values, (std::vector<double>{2, -1, -4, 12, 7, 7}));
+        EXPECT_EQ(valid, (std::vector<std::uint8_t>{1, 0, 1, 1, 1, 0}));
+        ASSERT_TRUE((*spool)->read_valid(0, valid));
+        EXPECT_EQ(valid, (std::vector<std::uint8_t>{1, 0, 1, 1, 1, 0}));
+    }
+}
+
 TEST(HeightSpool, NothingButVoidsIsRefused) {
     const test::TemporaryFolder folder;
     auto spool = HeightSpool::create(folder.file("heights"), 3, 2, false);

@@ -102,7 +102,7 @@ TEST(Georeference, ProjectedCodeVerticalCodeAndCitationAreRead) {
     EXPECT_EQ(g.linear_unit_m, 1);
 }
 
-TEST(Georeference, AUserDefinedCrsHasANameButNoCode) {
+TEST(Georeference, AUserDefinedCrsOfUnknownMethodHasANameButNoText) {
     const TempDirectory directory;
     TestTiff tiff = placed();
     tiff.projected = KvUserDefined;
@@ -113,6 +113,150 @@ TEST(Georeference, AUserDefinedCrsHasANameButNoCode) {
     EXPECT_EQ(g.crs_name, "our own grid");
     EXPECT_FALSE(g.geographic);
     EXPECT_DOUBLE_EQ(g.linear_unit_m, 1200.0 / 3937.0);
+}
+
+// A transverse Mercator of our own on ED 50, which has a code.
+TestTiff own_grid() {
+    TestTiff tiff = placed();
+    tiff.projected = KvUserDefined;
+    tiff.geographic = 4230;
+    tiff.citation = "our \"own\" grid";
+    tiff.linear_unit = Linear_Foot;
+    tiff.short_keys = {{ProjectionGeoKey, KvUserDefined}, {ProjCoordTransGeoKey, CT_TransverseMercator}};
+    tiff.double_keys = {{ProjNatOriginLongGeoKey, 9.5},
+                        {ProjNatOriginLatGeoKey, 10},
+                        {ProjScaleAtNatOriginGeoKey, 0.9996},
+                        {ProjFalseEastingGeoKey, 500000},
+                        {ProjFalseNorthingGeoKey, 1000}};
+    return tiff;
+}
+
+TEST(Georeference, AUserDefinedCrsIsAssembledWithItsDatumAndUnits) {
+    const TempDirectory directory;
+    const Georeference g = read_placed(directory, own_grid());
+    for (const char* part :
+         {"PROJCS[\"our 'own' grid\"", "DATUM[\"European Datum 1950\"", "6378388,297]", "AUTHORITY[\"EPSG\",\"6230\"]",
+          "AUTHORITY[\"EPSG\",\"4230\"]", "PROJECTION[\"Transverse_Mercator\"]", "\"latitude_of_origin\",10]",
+          "\"central_meridian\",9.5]", "\"scale_factor\",0.9996]", "\"false_easting\",500000]",
+          "\"false_northing\",1000]", "0.3048]]"})
+        EXPECT_NE(g.crs.find(part), std::string::npos) << part << " in " << g.crs;
+}
+
+TEST(Georeference, AnEllipsoidOfItsOwnIsKept) {
+    const TempDirectory directory;
+    TestTiff tiff = placed();
+    tiff.model_type = ModelTypeGeographic;
+    tiff.projected = 0;
+    tiff.geographic = KvUserDefined;
+    tiff.double_keys = {{GeogSemiMajorAxisGeoKey, 6371000}, {GeogInvFlatteningGeoKey, 300}};
+    tiff.short_keys = {{GeogEllipsoidGeoKey, KvUserDefined},
+                       {GeogGeodeticDatumGeoKey, KvUserDefined},
+                       {GeogAngularUnitsGeoKey, Angular_Degree}};
+    const Georeference g = read_placed(directory, tiff);
+    EXPECT_TRUE(g.geographic);
+    EXPECT_NE(g.crs.find("SPHEROID[\"unnamed\",6371000,300]"), std::string::npos) << g.crs;
+    EXPECT_EQ(g.crs.find("GEOGCS["), 0u);
+}
+
+TEST(Georeference, ParametersThatAreNotFiniteLeaveTheCrsUnsaid) {
+    const TempDirectory directory;
+    TestTiff tiff = own_grid();
+    tiff.double_keys[0].second = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_EQ(read_placed(directory, tiff).crs, "");
+}
+
+TEST(Georeference, EsriTextInACitationIsTheCrs) {
+    const TempDirectory directory;
+    TestTiff tiff = own_grid();
+    tiff.citation = "ESRI PE String = PROJCS[\"x\",GEOGCS[\"y\"]]|";
+    EXPECT_EQ(read_placed(directory, tiff).crs, "PROJCS[\"x\",GEOGCS[\"y\"]]");
+}
+
+TEST(Georeference, AUnitThatOverridesItsCodeIsHonoured) {
+    const TempDirectory directory;
+    TestTiff tiff = placed();
+    tiff.linear_unit = Linear_Meter;
+    EXPECT_EQ(read_placed(directory, tiff).crs, "EPSG:32633");
+    tiff.linear_unit = Linear_Foot;
+    const Georeference g = read_placed(directory, tiff);
+    EXPECT_NE(g.crs.find("\"central_meridian\",15]"), std::string::npos) << g.crs;
+    EXPECT_NE(g.crs.find("0.3048]]"), std::string::npos) << g.crs;
+    EXPECT_EQ(g.linear_unit_m, 0.3048);
+}
+
+TEST(Georeference, HeightUnitsComeFromKeysOrGdalsUnitType) {
+    const TempDirectory directory;
+    TestTiff tiff = placed();
+    EXPECT_EQ(read_placed(directory, tiff).height_unit_m, 0);
+    tiff.vertical = 6360;
+    EXPECT_DOUBLE_EQ(read_placed(directory, tiff).height_unit_m, 1200.0 / 3937);
+    tiff.short_keys = {{VerticalUnitsGeoKey, Linear_Foot}};
+    EXPECT_DOUBLE_EQ(read_placed(directory, tiff).height_unit_m, 0.3048);
+    tiff.short_keys.clear();
+    tiff.vertical = 5103;
+    tiff.gdal_metadata =
+        "<GDALMetadata><Item name=\"UNITTYPE\" sample=\"0\" role=\"unittype\">ft</Item></GDALMetadata>";
+    const Georeference g = read_placed(directory, tiff);
+    EXPECT_DOUBLE_EQ(g.height_unit_m, 0.3048);
+    EXPECT_EQ(g.vertical_datum, "EPSG:5703");
+}
+
+TEST(Georeference, IntergraphsMatrixPlacesAnOldFile) {
+    const TempDirectory directory;
+    TestTiff tiff = placed();
+    tiff.scale.clear();
+    tiff.tie_points.clear();
+    tiff.intergraph_matrix = {30, 5, 0, 1000, 4, -20, 0, 5000, 0, 0, 0, 0, 0, 0, 0, 1, 0};
+    const Georeference g = read_placed(directory, tiff);
+    EXPECT_EQ(g.first_x, 1000 + 15 + 2.5);
+    EXPECT_EQ(g.first_y, 5000 + 2 - 10);
+    EXPECT_EQ(g.column_x, 30);
+    EXPECT_EQ(g.column_y, 4);
+    EXPECT_EQ(g.row_x, 5);
+    EXPECT_EQ(g.row_y, -20);
+}
+
+TEST(Georeference, ANegativeYScaleIsReadAsNorthUpAsGdalDoes) {
+    const TempDirectory directory;
+    TestTiff tiff = placed();
+    tiff.scale = {30, -20, 0};
+    const Georeference g = read_placed(directory, tiff);
+    EXPECT_EQ(g.row_y, -20);
+    EXPECT_EQ(g.first_y, 4990);
+}
+
+TEST(Georeference, ControlPointsAloneAreRefusedWithTheirNumber) {
+    const TempDirectory directory;
+    TestTiff tiff = placed();
+    tiff.tie_points = {0, 0, 0, 1000, 5000, 0, 4, 0, 0, 1100, 5010, 0, 0, 3, 0, 990, 4900, 0};
+    for (const std::vector<double>& scale : {std::vector<double>{}, std::vector<double>{0, 0, 0}}) {
+        tiff.scale = scale;
+        const std::string path = directory.path("gcp.tif");
+        ASSERT_TRUE(test::write_tiff(path, tiff, kPixels.data()));
+        const auto read = read_georeference(path);
+        ASSERT_FALSE(read.ok());
+        EXPECT_EQ(read.error().code, ErrorCode::input);
+        EXPECT_NE(read.error().message.find("gcp.tif: placed by 3 ground control points"), std::string::npos);
+    }
+    directory.write("gcp.tfw", "10 0 0 -10 500 900");
+    const auto read = read_georeference(directory.path("gcp.tif"));
+    ASSERT_TRUE(read.ok() && read->has_value());
+    EXPECT_EQ((*read)->first_x, 500);
+    EXPECT_EQ((*read)->crs, "EPSG:32633");
+}
+
+TEST(Georeference, AProjectionFileFillsInForMissingKeysOnly) {
+    const TempDirectory directory;
+    TestTiff tiff = placed();
+    const std::string path = directory.path("p.tif");
+    directory.write("p.prj", "GEOGCS[\"x\"]\n");
+    ASSERT_TRUE(test::write_tiff(path, tiff, kPixels.data()));
+    EXPECT_EQ((*read_georeference(path))->crs, "EPSG:32633");
+    tiff.model_type = 0;
+    ASSERT_TRUE(test::write_tiff(path, tiff, kPixels.data()));
+    const auto read = read_georeference(path);
+    EXPECT_EQ((*read)->crs, "GEOGCS[\"x\"]");
+    EXPECT_TRUE((*read)->geographic);
 }
 
 TEST(Georeference, AGeographicFileSaysDegrees) {
@@ -128,7 +272,7 @@ TEST(Georeference, AGeographicFileSaysDegrees) {
 
 TEST(Georeference, AZeroOrInfiniteStepIsAnErrorThatNamesTheFile) {
     const TempDirectory directory;
-    for (const double step : {0.0, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
+    for (const double step : {0.0, 1e16, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
         TestTiff tiff = placed();
         tiff.scale = {step, 20, 0};
         const std::string path = directory.path("absurd.tif");

@@ -200,6 +200,33 @@ TEST(ImageSource, NodataThatNoPixelCanHoldIsNone) {
     EXPECT_FALSE(nodata_read_back<float>("none"));
 }
 
+TEST(ImageSource, ScaleAndOffsetOfTheFirstBandAreGivenAndNotApplied) {
+    const TempDirectory directory;
+    const std::vector<std::int16_t> values = {100, 200, 300, 400, 500, 600, 700, 800, 900, 1000, 1100, 1200};
+    TestTiff layout = layout_of<std::int16_t>(4, 3);
+    const auto item = [](int sample, const char* role, const char* text) {
+        return "  <Item name=\"X\" sample=\"" + std::to_string(sample) + "\" role=\"" + role + "\">" + text +
+               "</Item>\n";
+    };
+    const auto info_of = [&](const std::string& items) {
+        layout.gdal_metadata = "<GDALMetadata>\n<Item name=\"scale\">7</Item>" + items + "</GDALMetadata>";
+        EXPECT_TRUE(test::write_tiff(directory.path("m.tif"), layout, values.data()));
+        const auto source = open_or_fail(directory.path("m.tif"));
+        std::vector<float> read(12);
+        EXPECT_TRUE(source->read_channel(0, 3, std::span<float>(read)).ok());
+        EXPECT_EQ(read[11], 1200);
+        return source->info();
+    };
+    const ImageInfo centimetres = info_of(item(0, "offset", "-5") + item(0, "scale", "0.01") + item(1, "scale", "3"));
+    EXPECT_EQ(centimetres.value_scale, 0.01);
+    EXPECT_EQ(centimetres.value_offset, -5);
+    for (const char* text : {"0", "nan", "inf", "", "two"}) {
+        const ImageInfo info = info_of(item(0, "scale", text));
+        EXPECT_EQ(info.value_scale, 1) << text;
+        EXPECT_EQ(info.value_offset, 0);
+    }
+}
+
 TEST(ImageSource, GreyIsReplicatedAndOpaque) {
     const TempDirectory directory;
     std::vector<std::uint16_t> values(12, 0);

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <tiffio.h>
@@ -31,6 +32,11 @@ struct TestTiff {
     bool separate_planes = false;     ///< only with strips
     bool sparse = false;              ///< no pixels are written at all
     std::optional<int> extra_sample;  ///< what the last channel is
+    std::optional<int> photometric;
+    std::vector<std::uint16_t> colormap;  ///< all reds, all greens, all blues
+    std::optional<int> orientation;
+    std::vector<std::uint8_t> mask;  ///< a byte a pixel and mask channel, written as bits of a directory of its own
+    int mask_channels = 1;
     const char* nodata = nullptr;
     // GeoTIFF
     std::vector<double> scale;
@@ -43,15 +49,42 @@ struct TestTiff {
     int vertical = 0;
     int linear_unit = 0;
     const char* citation = nullptr;
+    std::vector<double> intergraph_matrix;
+    std::vector<std::pair<int, int>> short_keys;
+    std::vector<std::pair<int, double>> double_keys;
+    std::string gdal_metadata;
 };
 
-inline void add_nodata_tag(TIFF* file) {
-    static char name[] = "GDALNoDataValue";
-    static const TIFFFieldInfo kInfo[] = {{42113, -1, -1, TIFF_ASCII, FIELD_CUSTOM, 1, 0, name}};
-    TIFFMergeFieldInfo(file, kInfo, 1);
+inline void add_gdal_tags(TIFF* file) {
+    static char metadata[] = "GDALMetadata";
+    static char nodata[] = "GDALNoDataValue";
+    static const TIFFFieldInfo kInfo[] = {{42112, -1, -1, TIFF_ASCII, FIELD_CUSTOM, 1, 0, metadata},
+                                          {42113, -1, -1, TIFF_ASCII, FIELD_CUSTOM, 1, 0, nodata}};
+    TIFFMergeFieldInfo(file, kInfo, 2);
 }
 
-/// `samples` are row-major, interleaved, in the file's own type.
+inline bool write_mask(TIFF* file, const TestTiff& t) {
+    if (TIFFWriteDirectory(file) != 1) return false;
+    TIFFSetField(file, TIFFTAG_SUBFILETYPE, FILETYPE_MASK);
+    TIFFSetField(file, TIFFTAG_IMAGEWIDTH, t.width);
+    TIFFSetField(file, TIFFTAG_IMAGELENGTH, t.height);
+    TIFFSetField(file, TIFFTAG_SAMPLESPERPIXEL, t.mask_channels);
+    TIFFSetField(file, TIFFTAG_BITSPERSAMPLE, 1);
+    TIFFSetField(file, TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG);
+    TIFFSetField(file, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MASK);
+    TIFFSetField(file, TIFFTAG_ROWSPERSTRIP, t.height);
+    const std::size_t samples = static_cast<std::size_t>(t.width) * static_cast<std::size_t>(t.mask_channels);
+    bool written = true;
+    for (std::uint32_t row = 0; row < t.height; ++row) {
+        std::vector<std::uint8_t> line((samples + 7) / 8);
+        for (std::size_t i = 0; i < samples; ++i)
+            if (t.mask[row * samples + i] != 0) line[i / 8] = static_cast<std::uint8_t>(line[i / 8] | 0x80u >> i % 8);
+        written = written && TIFFWriteScanline(file, line.data(), row, 0) >= 0;
+    }
+    return written;
+}
+
+/// `samples` are row-major, interleaved, in the file's own type; of fewer than 8 bits packed, each row to whole bytes.
 inline bool write_tiff(const std::string& path, const TestTiff& t, const void* samples) {
     TIFF* file = XTIFFOpen(path.c_str(), t.mode);
     if (file == nullptr) return false;
@@ -62,7 +95,15 @@ inline bool write_tiff(const std::string& path, const TestTiff& t, const void* s
     TIFFSetField(file, TIFFTAG_SAMPLEFORMAT, t.format);
     TIFFSetField(file, TIFFTAG_COMPRESSION, t.compression);
     TIFFSetField(file, TIFFTAG_PLANARCONFIG, t.separate_planes ? PLANARCONFIG_SEPARATE : PLANARCONFIG_CONTIG);
-    TIFFSetField(file, TIFFTAG_PHOTOMETRIC, t.channels >= 3 ? PHOTOMETRIC_RGB : PHOTOMETRIC_MINISBLACK);
+    TIFFSetField(file, TIFFTAG_PHOTOMETRIC,
+                 t.photometric.value_or(t.channels >= 3 ? PHOTOMETRIC_RGB : PHOTOMETRIC_MINISBLACK));
+    if (!t.colormap.empty()) {
+        const std::size_t entries = t.colormap.size() / 3;
+        TIFFSetField(file, TIFFTAG_COLORMAP, t.colormap.data(), t.colormap.data() + entries,
+                     t.colormap.data() + 2 * entries);
+    }
+    if (t.orientation) TIFFSetField(file, TIFFTAG_ORIENTATION, *t.orientation);
+    if (t.photometric == PHOTOMETRIC_YCBCR) TIFFSetField(file, TIFFTAG_JPEGCOLORMODE, JPEGCOLORMODE_RGB);
     if (t.extra_sample) {
         const auto kind = static_cast<std::uint16_t>(*t.extra_sample);
         TIFFSetField(file, TIFFTAG_EXTRASAMPLES, 1, &kind);
@@ -73,10 +114,12 @@ inline bool write_tiff(const std::string& path, const TestTiff& t, const void* s
     } else {
         TIFFSetField(file, TIFFTAG_ROWSPERSTRIP, t.rows_per_strip);
     }
-    if (t.nodata != nullptr) {
-        add_nodata_tag(file);
-        TIFFSetField(file, 42113, t.nodata);
-    }
+    add_gdal_tags(file);
+    if (t.nodata != nullptr) TIFFSetField(file, 42113, t.nodata);
+    if (!t.gdal_metadata.empty()) TIFFSetField(file, 42112, t.gdal_metadata.c_str());
+    if (!t.intergraph_matrix.empty())
+        TIFFSetField(file, TIFFTAG_INTERGRAPH_MATRIX, static_cast<int>(t.intergraph_matrix.size()),
+                     t.intergraph_matrix.data());
     if (!t.scale.empty()) TIFFSetField(file, TIFFTAG_GEOPIXELSCALE, static_cast<int>(t.scale.size()), t.scale.data());
     if (!t.tie_points.empty())
         TIFFSetField(file, TIFFTAG_GEOTIEPOINTS, static_cast<int>(t.tie_points.size()), t.tie_points.data());
@@ -91,13 +134,18 @@ inline bool write_tiff(const std::string& path, const TestTiff& t, const void* s
         if (t.vertical != 0) GTIFKeySet(keys, VerticalCSTypeGeoKey, TYPE_SHORT, 1, t.vertical);
         if (t.linear_unit != 0) GTIFKeySet(keys, ProjLinearUnitsGeoKey, TYPE_SHORT, 1, t.linear_unit);
         if (t.citation != nullptr) GTIFKeySet(keys, GTCitationGeoKey, TYPE_ASCII, 0, t.citation);
+        for (const auto& [key, value] : t.short_keys)
+            GTIFKeySet(keys, static_cast<geokey_t>(key), TYPE_SHORT, 1, value);
+        for (const auto& [key, value] : t.double_keys)
+            GTIFKeySet(keys, static_cast<geokey_t>(key), TYPE_DOUBLE, 1, value);
         GTIFWriteKeys(keys);
         GTIFFree(keys);
     }
 
     const auto* bytes = static_cast<const std::uint8_t*>(samples);
     const std::size_t pixel_bytes = static_cast<std::size_t>(t.channels) * static_cast<std::size_t>(t.bits) / 8;
-    const std::size_t row_bytes = pixel_bytes * t.width;
+    const std::size_t row_bytes =
+        (static_cast<std::size_t>(t.width) * static_cast<std::size_t>(t.channels * t.bits) + 7) / 8;
     bool written = true;
     if (t.sparse) {
         written = TIFFWriteCheck(file, t.tile > 0 ? 1 : 0, "write_tiff") == 1;  // the arrays of offsets, all zero
@@ -133,6 +181,7 @@ inline bool write_tiff(const std::string& path, const TestTiff& t, const void* s
             written = written && TIFFWriteScanline(file, line.data(), row, 0) >= 0;
         }
     }
+    if (!t.mask.empty()) written = written && write_mask(file, t);
     XTIFFClose(file);
     return written;
 }

@@ -11,30 +11,63 @@
 #include "common/store/height_codec.h"
 #include "common/store/sqlite_store.h"
 #include "common/store/texture_codec.h"
+#include "tests/common/depth_map.h"
 
 namespace scree::test {
 namespace {
 
 struct Ground {
     Lattice lattice;
-    std::int64_t width, height;  // padded cells
+    std::int64_t width, height;  // padded finest cells
     std::vector<std::int32_t> z;
-    std::vector<std::uint8_t> cells;
+    std::vector<std::uint8_t> cells;    // valid in the source
+    std::vector<std::uint8_t> present;  // finest cells within a present cell of their leaf
+    DepthMap depth, texture_depth;
 
     std::int32_t sample(std::int64_t i, std::int64_t j) const {
         return z[static_cast<std::size_t>(j * (width + 1) + i)];
     }
-    bool cell(std::int64_t i, std::int64_t j) const {
-        return i >= 0 && j >= 0 && i < width && j < height && cells[static_cast<std::size_t>(j * width + i)] != 0;
+    bool is_leaf(TileId id) const {
+        return depth.exists(id) && (id.level == lattice.deepest_level || !depth.refined(id));
     }
-    bool vertex(std::int64_t i, std::int64_t j) const {
-        return cell(i, j) || cell(i - 1, j) || cell(i, j - 1) || cell(i - 1, j - 1);
+    TileId leaf_over(std::int64_t i, std::int64_t j) const {
+        TileId id{lattice.deepest_level, i >> lattice.tile_cells_log2, j >> lattice.tile_cells_log2};
+        while (!is_leaf(id)) id = parent_of(id);
+        return id;
+    }
+    bool cell(std::int64_t i, std::int64_t j) const {
+        return i >= 0 && j >= 0 && i < width && j < height && present[static_cast<std::size_t>(j * width + i)] != 0;
+    }
+    // A leaf's cell is present where all of the source is.
+    void find_present() {
+        present = cells;
+        for (std::int64_t j = 0; j < height; ++j)
+            for (std::int64_t i = 0; i < width; ++i) {
+                const std::int64_t side = lattice.step(leaf_over(i, j).level);
+                for (std::int64_t v = j / side * side; v < (j / side + 1) * side; ++v)
+                    for (std::int64_t u = i / side * side; u < (i / side + 1) * side; ++u)
+                        if (cells[static_cast<std::size_t>(v * width + u)] == 0)
+                            present[static_cast<std::size_t>(j * width + i)] = 0;
+            }
     }
     bool any_cell(LatticePoint from, std::int64_t extent) const {
         for (std::int64_t j = from.j; j < from.j + extent; ++j)
             for (std::int64_t i = from.i; i < from.i + extent; ++i)
                 if (cell(i, j)) return true;
         return false;
+    }
+    // Height, times the leaf's step, of the finest surface at (i, j) seen from finest cell (ci, cj).
+    double surface(std::int64_t ci, std::int64_t cj, std::int64_t i, std::int64_t j) const {
+        const TileId leaf = leaf_over(ci, cj);
+        const std::int64_t side = lattice.step(leaf.level);
+        const std::int64_t wi = ci / side * side, nj = cj / side * side, u = i - wi, v = j - nj;
+        const double nw = sample(wi, nj), ne = sample(wi + side, nj), sw = sample(wi, nj + side),
+                     se = sample(wi + side, nj + side);
+        const auto w = static_cast<double>(side), a = static_cast<double>(u), b = static_cast<double>(v);
+        if ((wi / side + nj / side) % 2 == 0)
+            return nw + (u > v ? a * (ne - nw) + b * (se - ne) : b * (sw - nw) + a * (se - sw)) / w;
+        if (u + v < side) return nw + (a * (ne - nw) + b * (sw - nw)) / w;
+        return se + ((w - a) * (sw - se) + (w - b) * (ne - se)) / w;
     }
 };
 
@@ -58,6 +91,12 @@ Ground make_ground(const SmallTerrain& t) {
                         patch && (t.present_percent == 100 || percent() < 95) ? 1 : 0;
         }
     g.cells[0] = 1;
+    if (t.varying) {
+        Random depths(t.seed);
+        g.depth = DepthMap::random(depths, g.lattice, g.lattice.deepest_level, t.graded);
+        g.texture_depth = DepthMap::random(depths, g.lattice, t.texture_deepest_level, false);
+    }
+    g.find_present();
     return g;
 }
 
@@ -73,17 +112,18 @@ double true_error(const Ground& ground, TileId id, const std::vector<std::int32_
     for (unsigned mask = 0; mask < kEdgeMaskCount; ++mask)
         for (std::int64_t j = 0; j <= l.tile_extent(id.level); ++j)
             for (std::int64_t i = 0; i <= l.tile_extent(id.level); ++i) {
-                // A vertex counts for the cells inside this tile only.
-                bool present = false;
+                // A vertex counts for the cells inside this tile only, each of which sees its own leaf.
                 for (int k = 0; k < 4; ++k) {
                     const std::int64_t ci = i - (k & 1), cj = j - (k >> 1);
-                    present = present || (ci >= 0 && cj >= 0 && ci < l.tile_extent(id.level) &&
-                                          cj < l.tile_extent(id.level) && ground.cell(corner.i + ci, corner.j + cj));
+                    if (ci < 0 || cj < 0 || ci >= l.tile_extent(id.level) || cj >= l.tile_extent(id.level) ||
+                        !ground.cell(corner.i + ci, corner.j + cj))
+                        continue;
+                    const double drawn =
+                        drawn_height(samples, l.tile_cells_log2, {geomip, mask}, i, j, l.step(id.level)).quanta();
+                    worst = std::max(
+                        worst,
+                        std::abs(ground.surface(corner.i + ci, corner.j + cj, corner.i + i, corner.j + j) - drawn));
                 }
-                if (!present) continue;
-                const double drawn =
-                    drawn_height(samples, l.tile_cells_log2, {geomip, mask}, i, j, l.step(id.level)).quanta();
-                worst = std::max(worst, std::abs(ground.sample(corner.i + i, corner.j + j) - drawn));
             }
     return worst;
 }
@@ -91,29 +131,40 @@ double true_error(const Ground& ground, TileId id, const std::vector<std::int32_
 void add_heights(const Ground& ground, SmallStore& store) {
     const Lattice& l = ground.lattice;
     const int m = l.tile_cells();
+    int coarsest_leaf = l.deepest_level;
     for (int level = l.deepest_level; level >= 0; --level)
         for (std::int64_t y = 0; y < l.tiles_y(level); ++y)
             for (std::int64_t x = 0; x < l.tiles_x(level); ++x) {
                 const TileId id{level, x, y};
                 const LatticePoint corner = l.corner(id);
-                if (!ground.any_cell(corner, l.tile_extent(level))) continue;
+                if (!ground.depth.exists(id) || !ground.any_cell(corner, l.tile_extent(level))) continue;
+                const std::int64_t step = l.step(level);
                 HeightTile tile;
+                tile.header.texture_ends = level < store.dataset.texture_deepest_level &&
+                                           !(ground.texture_depth.exists(id) && ground.texture_depth.refined(id));
                 for (int j = 0; j <= m; ++j)
                     for (int i = 0; i <= m; ++i)
-                        tile.samples.push_back(
-                            ground.sample(corner.i + i * l.step(level), corner.j + j * l.step(level)));
-                if (level == l.deepest_level) {
+                        tile.samples.push_back(ground.sample(corner.i + i * step, corner.j + j * step));
+                if (ground.is_leaf(id)) {
+                    coarsest_leaf = std::min(coarsest_leaf, level);
                     bool all = true;
                     for (int k = 0; k < m * m; ++k) {
-                        tile.presence.push_back(ground.cell(corner.i + k % m, corner.j + k / m) ? 1 : 0);
+                        tile.presence.push_back(ground.cell(corner.i + k % m * step, corner.j + k / m * step) ? 1 : 0);
                         all = all && tile.presence.back() != 0;
                     }
                     store.dataset.present_cells += std::count(tile.presence.begin(), tile.presence.end(), 1);
                     if (all) tile.presence.clear();
                 } else {
                     for (int q = 0; q < 4; ++q)
-                        if (store.heights.count(child_of(id, q)) != 0)
-                            tile.header.child_mask = static_cast<std::uint8_t>(tile.header.child_mask | 1 << q);
+                        if (const auto child = store.heights.find(child_of(id, q)); child != store.heights.end()) {
+                            HeightTileHeader& header = tile.header;
+                            const HeightTileHeader& below = child->second.header;
+                            const bool leaf = below.is_leaf() && level + 1 < l.deepest_level;
+                            header.child_mask = static_cast<std::uint8_t>(header.child_mask | 1 << q);
+                            header.leaf_mask = static_cast<std::uint8_t>(header.leaf_mask | int{leaf} << q);
+                            header.texture_end_mask =
+                                static_cast<std::uint8_t>(header.texture_end_mask | int{below.texture_ends} << q);
+                        }
                 }
                 double running = 0;
                 for (int g = 0; g < l.tile_cells_log2; ++g) {
@@ -127,6 +178,7 @@ void add_heights(const Ground& ground, SmallStore& store) {
                 }
                 store.heights[id] = std::move(tile);
             }
+    if (coarsest_leaf < l.deepest_level) store.dataset.coarsest_leaf_level = coarsest_leaf;
 }
 
 using Alpha = std::vector<std::uint8_t>;
@@ -171,39 +223,67 @@ TextureTile texture_of(Alpha texels, int size_log2) {
     return tile;
 }
 
+// Alpha of a whole texture level, as the deepest textures there have it: by the cells under their texels' centres.
+Alpha alpha_by_cells(const Ground& ground, int level, std::int64_t size) {
+    const Lattice& l = ground.lattice;
+    const std::int64_t width = l.tiles_x(level) * size, height = l.tiles_y(level) * size;
+    const double texel_cells = std::ldexp(l.tile_cells(), l.deepest_level - level) / static_cast<double>(size);
+    const auto centre = [&](std::int64_t texel) {
+        return static_cast<std::int64_t>(std::floor((static_cast<double>(texel) + 0.5) * texel_cells));
+    };
+    Alpha alpha;
+    for (std::int64_t r = 0; r < height; ++r)
+        for (std::int64_t c = 0; c < width; ++c) alpha.push_back(ground.cell(centre(c), centre(r)) ? 255 : 0);
+    return alpha;
+}
+
 void add_textures(const Ground& ground, SmallStore& store) {
     const Lattice& l = ground.lattice;
     const int deepest = store.dataset.texture_deepest_level;
     const std::int64_t size = store.dataset.texture_size();
-    std::int64_t width = l.tiles_x(deepest) * size, height = l.tiles_y(deepest) * size;
-    const double texel_cells = std::ldexp(l.tile_cells(), l.deepest_level - deepest) / static_cast<double>(size);
-    Alpha alpha;
-    for (std::int64_t r = 0; r < height; ++r)
-        for (std::int64_t c = 0; c < width; ++c)
-            alpha.push_back(
-                ground.cell(static_cast<std::int64_t>(std::floor((static_cast<double>(c) + 0.5) * texel_cells)),
-                            static_cast<std::int64_t>(std::floor((static_cast<double>(r) + 0.5) * texel_cells)))
-                    ? 255
-                    : 0);
+    const auto side = [&](int level) { return std::pair(l.tiles_x(level) * size, l.tiles_y(level) * size); };
+    // Which tiles hold a texel of the deepest level over a present cell.
+    const Alpha finest = alpha_by_cells(ground, deepest, size);
+    const auto any_opaque = [&](TileId id) {
+        const std::int64_t texels = size << (deepest - id.level);
+        for (std::int64_t r = id.y * texels; r < (id.y + 1) * texels; ++r)
+            for (std::int64_t c = id.x * texels; c < (id.x + 1) * texels; ++c)
+                if (finest[static_cast<std::size_t>(r * side(deepest).first + c)] != 0) return true;
+        return false;
+    };
+    const auto wanted = [&](TileId id) {
+        if (!ground.texture_depth.exists(id)) return false;
+        if (id.level <= l.deepest_level && ground.depth.exists(id)) return store.heights.count(id) != 0;
+        return any_opaque(id);
+    };
+    Alpha below;
     for (int level = deepest; level >= 0; --level) {
+        const auto [width, height] = side(level);
+        Alpha alpha = alpha_by_cells(ground, level, size);
+        if (level < deepest) {
+            const Alpha averaged = halved(below, 2 * width, 2 * height);
+            for (std::int64_t r = 0; r < height; ++r)
+                for (std::int64_t c = 0; c < width; ++c) {
+                    const TileId over{level, c / size, r / size};
+                    const auto k = static_cast<std::size_t>(r * width + c);
+                    if (ground.texture_depth.exists(over) && ground.texture_depth.refined(over)) alpha[k] = averaged[k];
+                }
+        }
         for (std::int64_t y = 0; y < l.tiles_y(level); ++y)
             for (std::int64_t x = 0; x < l.tiles_x(level); ++x) {
                 const TileId id{level, x, y};
+                if (!wanted(id)) continue;
                 Alpha texels;
                 for (std::int64_t r = y * size; r < (y + 1) * size; ++r)
                     for (std::int64_t c = x * size; c < (x + 1) * size; ++c)
                         texels.push_back(alpha[static_cast<std::size_t>(r * width + c)]);
-                const bool opaque = std::any_of(texels.begin(), texels.end(), [](int a) { return a >= 128; });
-                if (level <= l.deepest_level ? store.heights.count(id) == 0 : !opaque) continue;
                 TextureTile tile = texture_of(texels, store.dataset.texture_size_log2);
                 for (int q = 0; q < 4; ++q)
                     if (store.textures.count(child_of(id, q)) != 0)
                         tile.child_mask = static_cast<std::uint8_t>(tile.child_mask | 1 << q);
                 store.textures[id] = std::move(tile);
             }
-        alpha = halved(alpha, width, height);
-        width /= 2;
-        height /= 2;
+        below = std::move(alpha);
     }
 }
 

@@ -1,6 +1,6 @@
 // Builds small consistent stores by brute force, the definitions spelled out: every error over all 16 masks at every
-// finest vertex by drawn_height, every texel over one raster of the whole deepest texture level. Tests damage the parts
-// before they are written.
+// finest vertex by drawn_height, every texel over one raster of a whole texture level. Depths may vary by place. Tests
+// damage the parts before they are written.
 #pragma once
 
 #include <cstdint>
@@ -22,6 +22,8 @@ struct SmallTerrain {
     int amplitude = 1000;
     int present_percent = 100;  ///< of 4 x 4 patches and, a little, of single cells
     std::uint64_t seed = 1;
+    bool varying = false;  ///< depths of heights and textures at random
+    bool graded = true;
 };
 
 struct SmallStore {

@@ -368,5 +368,179 @@ TEST(VerifyDamage, RandomBytesOverAPageAreAProblemOrAnErrorNeverACrash) {
     }
 }
 
+constexpr test::SmallTerrain kVarying{
+    .cells_x = 62, .cells_y = 64, .texture_deepest_level = 4, .present_percent = 90, .seed = 11, .varying = true};
+
+VerifyReport verify_varying_after(const std::function<void(SmallStore&)>& damage) {
+    return verify_after(damage, {}, kVarying);
+}
+
+// Extents that share an edge or a part of one.
+bool share_an_edge(const Lattice& l, TileId a, TileId b) {
+    const LatticePoint p = l.corner(a), q = l.corner(b);
+    const std::int64_t u = l.tile_extent(a.level), v = l.tile_extent(b.level);
+    const std::int64_t wide = std::min(p.i + u, q.i + v) - std::max(p.i, q.i);
+    const std::int64_t high = std::min(p.j + u, q.j + v) - std::max(p.j, q.j);
+    return (wide == 0 && high > 0) || (high == 0 && wide > 0);
+}
+
+TEST(VerifyDamage, EveryTileMoreThanALevelBelowALeafBesideItIsNamed) {
+    SCREE_TRACE_SEED();
+    int ungraded = 0, graded = 0;
+    for (std::uint64_t k = 0; k < 30; ++k) {
+        test::SmallTerrain terrain = kVarying;
+        terrain.seed = test::seed() + k;
+        terrain.graded = false;
+        terrain.texture_deepest_level = 1;
+        SCOPED_TRACE("seed " + std::to_string(terrain.seed));
+        const SmallStore store = test::make_small_store(terrain);
+        const VerifyReport report = verify_after({}, {}, terrain);
+        int pairs = 0;
+        for (const auto& [id, tile] : store.heights)
+            for (const auto& [leaf, other] : store.heights) {
+                if (!other.header.is_leaf() || leaf.level >= id.level - 1) continue;
+                if (!share_an_edge(store.dataset.lattice, id, leaf)) continue;
+                ++pairs;
+                // A parent's side is named once, by one of the two tiles along it.
+                const std::string beside = " lies beside the leaf " + std::to_string(leaf.level) + "/" +
+                                           std::to_string(leaf.x) + "/" + std::to_string(leaf.y);
+                bool named = false;
+                for (int q = 0; q < 4; ++q) {
+                    const TileId sibling = child_of(parent_of(id), q);
+                    const std::string name = "height tile " + std::to_string(sibling.level) + "/" +
+                                             std::to_string(sibling.x) + "/" + std::to_string(sibling.y) + beside;
+                    for (const std::string& problem : report.problems) named = named || problem.starts_with(name);
+                }
+                EXPECT_TRUE(named) << id.level << "/" << id.x << "/" << id.y << beside;
+            }
+        EXPECT_EQ(report.sound(), pairs == 0);
+        ++(pairs > 0 ? ungraded : graded);
+    }
+    EXPECT_GT(ungraded, 5);
+    EXPECT_GT(graded, 1);
+}
+
+TEST(VerifyDamage, EveryAncestorsBoundOverLeavesOfVariousDepths) {
+    const SmallStore sound = test::make_small_store(kVarying);
+    const int deepest = sound.dataset.lattice.deepest_level;
+    int over_mixed = 0;
+    for (const auto& [id, tile] : sound.heights) {
+        if (tile.header.is_leaf()) continue;
+        const auto own = tile.header.own.error_n;
+        const float below = std::nextafter(own[1], -1.0f);
+        if (below < own[0]) continue;  // the codec refuses errors that fall
+        const TileId place = id;
+        const VerifyReport report = verify_varying_after([&](SmallStore& s) {
+            s.heights.at(place).header.own.error_n[1] = below;
+            s.copy_bounds_to_parents();
+        });
+        EXPECT_GE(report.bound_violations, 1) << id.level << "/" << id.x << "/" << id.y;
+        over_mixed += id.level + 1 < deepest ? 1 : 0;
+    }
+    EXPECT_GT(over_mixed, 1);
+}
+
+TEST(VerifyDamage, PresenceOfALeafAboveTheDeepestLevel) {
+    const auto coarse_leaf = [](SmallStore& s) -> std::pair<const TileId, HeightTile>& {
+        const int deepest = s.dataset.lattice.deepest_level;
+        return *std::find_if(s.heights.begin(), s.heights.end(), [&](const auto& tile) {
+            return tile.second.header.is_leaf() && tile.first.level < deepest && tile.second.presence.empty();
+        });
+    };
+    const VerifyReport fewer = verify_varying_after([&](SmallStore& s) {
+        auto& presence = coarse_leaf(s).second.presence;
+        presence.assign(16, 1);
+        presence[5] = 0;
+    });
+    EXPECT_TRUE(names(fewer, "texels are transparent where there are heights"));
+    EXPECT_TRUE(names(fewer, "present cells, the tiles hold"));
+    const VerifyReport none =
+        verify_varying_after([&](SmallStore& s) { coarse_leaf(s).second.presence.assign(16, 0); });
+    EXPECT_TRUE(names(none, "is stored without a present cell"));
+}
+
+TEST(VerifyDamage, ACellOfALeafThatReachesHalfBeyondTheData) {
+    std::vector<std::string> at_the_edge;
+    for (const auto& [id, tile] : test::make_small_store(kVarying).heights)
+        if (id.level == 3 && id.x == 7 && tile.header.is_leaf() && !tile.presence.empty() && tile.presence[2] != 0)
+            at_the_edge.push_back("height tile 3/7/" + std::to_string(id.y) + ": ");
+    ASSERT_FALSE(at_the_edge.empty());
+    // Its third column of cells, of two finest cells each, lies over columns 60 and 61.
+    const VerifyReport report = verify_varying_after([](SmallStore& s) { s.dataset.lattice.cells_x = 61; });
+    int named = 0;
+    for (const std::string& tile : at_the_edge)
+        for (const std::string& problem : report.problems)
+            named += problem.starts_with(tile) && problem.ends_with("cells outside the data's extent are present");
+    EXPECT_EQ(named, static_cast<int>(at_the_edge.size()));
+}
+
+TEST(VerifyDamage, WhatParentsSayOfTheDepthBelowThem) {
+    const auto change_first = [](SmallStore& s, const auto& fits, const auto& change) {
+        for (auto& [id, tile] : s.heights)
+            if (fits(id, tile.header)) return change(tile.header);
+        FAIL() << "no such tile";
+    };
+    const VerifyReport leaf = verify_varying_after([&](SmallStore& s) {
+        change_first(
+            s, [](TileId, const HeightTileHeader& h) { return h.leaf_mask != 0; },
+            [](HeightTileHeader& h) { h.leaf_mask = 0; });
+    });
+    EXPECT_TRUE(names(leaf, "is a leaf above the deepest level; its parent says otherwise"));
+    const VerifyReport inner = verify_varying_after([&](SmallStore& s) {
+        change_first(
+            s, [](TileId id, const HeightTileHeader& h) { return id.level == 0 && h.leaf_mask != h.child_mask; },
+            [](HeightTileHeader& h) { h.leaf_mask = h.child_mask; });
+    });
+    EXPECT_TRUE(names(inner, "is no leaf above the deepest level; its parent says otherwise"));
+    const VerifyReport copied = verify_varying_after([&](SmallStore& s) {
+        change_first(
+            s, [](TileId, const HeightTileHeader& h) { return h.child_mask != 0; },
+            [](HeightTileHeader& h) {
+                h.texture_end_mask = static_cast<std::uint8_t>(h.texture_end_mask ^ h.child_mask);
+            });
+    });
+    EXPECT_TRUE(names(copied, "its parent says otherwise of whether its textures end here"));
+    const VerifyReport coarsest =
+        verify_varying_after([](SmallStore& s) { s.dataset.coarsest_leaf_level = std::nullopt; });
+    EXPECT_TRUE(names(coarsest, "dataset: the coarsest leaf is of level"));
+}
+
+TEST(VerifyDamage, WhereTexturesEnd) {
+    int too_early = 0, too_late = 0, leaves = 0;
+    const SmallStore sound = test::make_small_store(kVarying);
+    for (const auto& [id, tile] : sound.heights) {
+        if (id.level >= sound.dataset.texture_deepest_level) continue;
+        const TileId place = id;
+        const bool ends = tile.header.texture_ends;
+        const VerifyReport report = verify_varying_after([&](SmallStore& s) {
+            s.heights.at(place).header.texture_ends = !ends;
+            if (place.level == 0) return;
+            std::uint8_t& mask = s.heights.at(parent_of(place)).header.texture_end_mask;
+            mask = static_cast<std::uint8_t>(mask ^ 1 << quadrant_of(place));
+        });
+        EXPECT_FALSE(report.sound()) << id.level << "/" << id.x << "/" << id.y;
+        if (ends && sound.textures.count(id) == 0) {
+            EXPECT_TRUE(names(report, "does not say that textures end here"));
+        } else {
+            EXPECT_TRUE(names(report, ends ? "is missing" : "should be 0000"));
+        }
+        ++(ends ? too_late : too_early);
+        leaves += tile.header.is_leaf() ? 1 : 0;
+    }
+    EXPECT_GT(too_early, 3);
+    EXPECT_GT(too_late, 10);
+    EXPECT_GT(leaves, 3);
+}
+
+TEST(VerifyDamage, ATextureMissingBelowOneWithOthers) {
+    const VerifyReport report = verify_varying_after([](SmallStore& s) {
+        auto last = std::prev(s.textures.end());
+        ASSERT_GT(last->first.level, 1);
+        s.textures.erase(last);
+        --s.dataset.texture_tiles;
+    });
+    EXPECT_TRUE(names(report, "is missing"));
+}
+
 }  // namespace
 }  // namespace scree

@@ -55,6 +55,28 @@ TEST(VerifySound, HolesOfEverySize) {
         }
 }
 
+TEST(VerifySound, DepthsThatVaryByPlace) {
+    SCREE_TRACE_SEED();
+    std::int64_t coarse_leaves = 0, textures_end = 0;
+    for (std::uint64_t k = 0; k < 24; ++k) {
+        const std::uint64_t seed = test::seed() + k;
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        const test::SmallTerrain terrain{.cells_x = 27 + 5 * static_cast<std::int64_t>(k % 3),
+                                         .cells_y = 30,
+                                         .texture_deepest_level = static_cast<int>(k % 6),
+                                         .present_percent = k % 2 == 0 ? 100 : 85,
+                                         .seed = seed,
+                                         .varying = true};
+        expect_sound(terrain);
+        for (const auto& [id, tile] : test::make_small_store(terrain).heights) {
+            coarse_leaves += tile.header.is_leaf() && id.level < 3 ? 1 : 0;
+            textures_end += tile.header.texture_ends ? 1 : 0;
+        }
+    }
+    EXPECT_GT(coarse_leaves, 100);
+    EXPECT_GT(textures_end, 100);
+}
+
 TEST(VerifySound, EveryDepthOfTexture) {
     for (int level = 0; level <= 5; ++level) {
         SCOPED_TRACE("texture level " + std::to_string(level));

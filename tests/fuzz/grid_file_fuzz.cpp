@@ -1,0 +1,105 @@
+// Readers of DEM formats. The first byte of an input says which; the rest is the file, or its text header where the
+// samples themselves need no parsing.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+
+#include <fmt/format.h>
+
+#include "tests/fuzz/file_input.h"
+#include "tests/fuzz/fuzz_target.h"
+#include "tools/source/grid_file.h"
+
+namespace scree::fuzz {
+namespace {
+
+constexpr std::array<const char*, 9> kNames = {"a.asc", "a.dt1", "b.bil", "b.bip", "b.bsq",
+                                               "b.flt", "b.dem", "c.dem", "c.dat"};
+
+std::string dted() {
+    std::string file =
+        fmt::format("UHL1{}{}{:04}{:04}0030U  {:12}{:04}{:04}0", "0015930E", "0101500S", 1800, 1200, "", 5, 6);
+    file.resize(80 + 648 + 2700, ' ');
+    for (unsigned column = 0; column < 5; ++column) {
+        std::string record("\xAA\0\0\0\0\0\0\0", 8);
+        record[3] = record[5] = static_cast<char>(column);
+        record.resize(20, static_cast<char>(column));
+        unsigned sum = 0;
+        for (const char c : record) sum += static_cast<unsigned char>(c);
+        for (int shift = 24; shift >= 0; shift -= 8) record += static_cast<char>(sum >> shift);
+        file += record;
+    }
+    return file;
+}
+
+std::string raw_header(const char* layout) {
+    return fmt::format(
+        "BYTEORDER M\nLAYOUT {}\nNROWS 3\nNCOLS 4\nNBANDS 3\nNBITS 16\nPIXELTYPE SIGNEDINT\nBANDROWBYTES 8\n"
+        "TOTALROWBYTES 24\nBANDGAPBYTES 0\nSKIPBYTES 2\nNODATA -9999\nULXMAP 1\nULYMAP 2\nXDIM 3\nYDIM 4\n",
+        layout);
+}
+
+std::string of_kind(std::size_t name, const std::string& content) { return static_cast<char>(name) + content; }
+
+void decode_all(const std::string& path, GridFile& grid) {
+    const DecodedLayout& layout = grid.decoder->layout();
+    require(layout.width > 0 && layout.height > 0 && layout.channels > 0, "an opened grid has samples");
+    const std::size_t row_bytes = static_cast<std::size_t>(layout.width * layout.channels) * memory_bytes(layout.type);
+    require(row_bytes <= 64 * std::filesystem::file_size(path), "a row is no larger than the file lets it be");
+    std::vector<std::byte> rows(row_bytes * 2);
+    for (std::int64_t begin = 0; begin < layout.height; begin += 2) {
+        const std::int64_t end = std::min(begin + 2, layout.height);
+        if (!grid.decoder->decode(begin, end, rows.data())) return;
+    }
+    static_cast<void>(grid.decoder->decode(0, 1, rows.data()));
+}
+
+}  // namespace
+
+std::vector<std::string> seeds() {
+    return {
+        of_kind(0, "ncols 3\nnrows 2\nxllcorner 1000\nyllcorner 5000\ncellsize 10\nNODATA_value -9999\n1 2 3\n4 5 6\n"),
+        of_kind(0, "NROWS 2 NCOLS 2 YLLCENTER 1 XLLCENTER 2 DX 1 DY 2\n1.5 -2e3 nan +7"),
+        of_kind(1, dted()),
+        of_kind(2, raw_header("BIL")),
+        of_kind(3, raw_header("BIP")),
+        of_kind(4, raw_header("BSQ")),
+        of_kind(5, "ncols 4\nnrows 5\nxllcorner 1\nyllcorner 2\ncellsize 3\nNODATA_value -9999\nbyteorder MSBFIRST\n"),
+        of_kind(8,
+                "ENVI\ndescription = {\n x}\nsamples = 4\nlines = 3\nbands = 2\nheader offset = 1\ndata type = 2\n"
+                "interleave = bil\nbyte order = 1\nmap info = {UTM, 1, 1, 5, 6, 7, 8, 33, North, WGS-84}\n"
+                "coordinate system string = {GEOGCS[\"x\"]}\ndata ignore value = -1\n")};
+}
+
+}  // namespace scree::fuzz
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+    using namespace scree;
+    using namespace scree::fuzz;
+    if (size == 0) return 0;
+    const std::string name = kNames[data[0] % kNames.size()];
+    const std::string_view content = text_of(data + 1, size - 1);
+    const std::string path = folder().path(name);
+    const bool headered = name[0] == 'b' || name == "c.dat";
+    static const std::string kSamples(997, '\x11');
+    folder().write(name, headered ? std::string_view(kSamples) : content);
+    const std::string header = path.substr(0, path.size() - 3) + "hdr";
+    if (headered)
+        folder().write(std::filesystem::path(header).filename().string(), content);
+    else
+        std::filesystem::remove(header);
+    Result<std::optional<GridFile>> grid = open_grid_file(path);
+    if (!grid) {
+        require(grid.error().code == ErrorCode::input, "what cannot be read is an input error");
+        return 0;
+    }
+    if (!grid->has_value()) return 0;
+    if ((*grid)->georeference) {
+        const Georeference& place = *(*grid)->georeference;
+        require(std::isfinite(place.first_x) && std::isfinite(place.first_y) && place.column_x != 0 && place.row_y != 0,
+                "an opened grid lies somewhere");
+    }
+    decode_all(path, **grid);
+    return 0;
+}

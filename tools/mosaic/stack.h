@@ -1,0 +1,118 @@
+// The layers of a mosaic, one over the other, as values on the points of a square north-up grid.
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/result.h"
+#include "tools/mosaic/layer.h"
+#include "tools/mosaic/raster_spool.h"
+#include "tools/source/height_source.h"
+#include "tools/source/resample.h"
+
+namespace scree {
+
+struct StackOptions {
+    Kernel kernel = Kernel::bilinear;
+    OpenOptions open;
+    HeightReading heights;  ///< of a height stack
+    std::string temporary;  ///< what the names of temporary files begin with
+};
+
+/// What a long reading calls now and then with the samples read since the last call; false stops it
+/// (ErrorCode::interrupted).
+using ReadProgress = std::function<bool(std::int64_t samples)>;
+
+/// Bytes of temporary disk that reading these layers may take.
+std::int64_t height_stack_bytes(const std::vector<PlacedFile>& files);
+std::int64_t image_stack_bytes(const std::vector<PlacedFile>& files);
+
+class HeightGrid;
+
+struct HeightRange {
+    double low = std::numeric_limits<double>::infinity(), high = -std::numeric_limits<double>::infinity();
+    void include(const HeightRange& other) {
+        low = std::min(low, other.low);
+        high = std::max(high, other.high);
+    }
+};
+
+/// Heights in metres: value * scale + offset as HeightReading and the file say; or the files' raw values.
+class HeightStack {
+public:
+    /// Decodes every file once. `raw_values`: hands out file values as they are. Errors: those of the files.
+    static Result<std::unique_ptr<HeightStack>> read(const std::vector<PlacedFile>& files, std::vector<Layer> layers,
+                                                     bool raw_values, const StackOptions& options,
+                                                     const ReadProgress& progress);
+    ~HeightStack();
+
+    /// The heights on the points of a grid. The stack must outlive it.
+    Result<std::unique_ptr<HeightGrid>> on(const TargetGrid& grid, const Crs& grid_crs) const;
+
+    /// Of all values in the files, whether hidden or not; widened by cubic resampling's overshoot.
+    HeightRange range() const;
+    /// What the files hold that looks like undeclared nodata, one sentence a file.
+    const std::vector<std::string>& warnings() const;
+    std::size_t layer_count() const;
+    const Layer& layer(std::size_t k) const;
+    /// Samples of a layer as they are after its files were laid over one another: [column, column + columns) x ...,
+    /// row-major; NaN: void, -infinity: no file, also outside the layer. Any thread.
+    Result<void> samples(std::size_t k, std::int64_t column, std::int64_t row, std::int64_t columns, std::int64_t rows,
+                         std::span<double> out) const;
+    /// The blocks of RasterSpool::kBlock samples a side of a layer that hold anything, by rows.
+    struct Block {
+        std::int64_t column = 0, row = 0;  ///< first sample
+    };
+    std::vector<Block> blocks(std::size_t k) const;
+
+    struct Impl;
+
+private:
+    explicit HeightStack(std::unique_ptr<Impl> impl);
+    std::unique_ptr<Impl> impl_;
+};
+
+class HeightGrid {
+public:
+    ~HeightGrid();
+    /// Points (i + c * stride, j + r * stride), c < columns, r < rows, row-major: the topmost layer's value; NaN: a
+    /// void of the files; -infinity: no file reaches here. Any thread. A point's value does not depend on the
+    /// rectangle.
+    Result<void> sample(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows, std::int64_t stride,
+                        std::span<double> out) const;
+
+    struct Impl;
+
+private:
+    friend class HeightStack;
+    explicit HeightGrid(std::unique_ptr<Impl> impl);
+    std::unique_ptr<Impl> impl_;
+};
+
+/// Colours as RGBA (R lowest byte): the topmost layer's pixel with alpha >= 128, opaque; 0 where there is none.
+class ImageStack {
+public:
+    static Result<std::unique_ptr<ImageStack>> read(const std::vector<PlacedFile>& files, std::vector<Layer> layers,
+                                                    const TargetGrid& grid, const Crs& grid_crs,
+                                                    const StackOptions& options, const ReadProgress& progress);
+    ~ImageStack();
+    Result<void> sample(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
+                        std::span<std::uint32_t> out) const;
+
+private:
+    struct Impl;
+    explicit ImageStack(std::unique_ptr<Impl> impl);
+    std::unique_ptr<Impl> impl_;
+};
+
+/// A layer whose samples are grid points, each at a whole number of steps: it is copied, not resampled.
+bool on_grid(const Layer& layer, const TargetGrid& grid, const Crs& grid_crs);
+
+}  // namespace scree
