@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kOneSample = 1e-3;  // what may be lost by taking a grid for square or for the lattice's own, samples
 constexpr double kFinerBy = 1.1;     // a layer this much finer than the lattice asks for no finer one
-constexpr double kBranchCost = 2;       // of a point made tile by tile, against one of the dense part
+constexpr double kBranchCost = 2;    // of a point made tile by tile, against one of the dense part
 constexpr double kWarnedScale = 1.001;  // of the CRS against the ground
 
 Error input_error(std::string message) { return {ErrorCode::input, std::move(message)}; }
@@ -330,12 +330,13 @@ private:
         return {};
     }
 
-    // Halvings that are left to single branches: those that make the fewest points in all. `points`: of the finest
-    // lattice, if it were dense.
+    // Halvings that are left to single branches: those that make the fewest points in all, and none of the coarsest
+    // layer's. `points`: of the finest lattice, if it were dense.
     int base_shift(double points, double step) const {
         int best = 0;
         double least = std::numeric_limits<double>::infinity();
-        for (int shift = 0; shift <= kMaxLevel && std::ldexp(points, -2 * shift) >= 1; ++shift) {
+        const int most = coarser_by(*std::max_element(cell_sizes_.begin(), cell_sizes_.end()), step);
+        for (int shift = 0; shift <= most; ++shift) {
             double cost = std::ldexp(points, -2 * shift);
             for (std::size_t k = 0; k < plan_.height_layers.size(); ++k)
                 if (coarser_by(cell_sizes_[k], step) < shift) cost += kBranchCost * points_of(plan_.height_layers[k]);

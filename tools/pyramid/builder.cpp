@@ -132,9 +132,14 @@ Result<void> fill_voids(const BuildPlan& plan, const BuildOptions& options, cons
 
 // Where finer layers go on below the dense part.
 struct DeepPart {
+    explicit DeepPart(const BuildPlan& plan)
+        : tree(plan.mosaic.lattice, plan.mosaic.base_lattice().deepest_level),
+          presence(plan.dataset.texture_deepest_level) {}
+
     DeepTree tree;
     std::unique_ptr<HeightGrid> grid;
     std::optional<DeepHeights> heights;
+    DeepPresence presence;
 };
 
 // Every block of samples that a layer has deepens the tiles under it.
@@ -171,7 +176,7 @@ Result<void> mark_layer(const MosaicPlan& m, const HeightStack& stack, std::size
 Result<std::unique_ptr<DeepPart>> plan_depth(const BuildPlan& plan, const HeightStack& stack, const HeightSpool& spool,
                                              const HeightQuantizer& quantizer) {
     const MosaicPlan& m = plan.mosaic;
-    auto deep = std::make_unique<DeepPart>(DeepPart{DeepTree(m.lattice, m.base_lattice().deepest_level), nullptr, {}});
+    auto deep = std::make_unique<DeepPart>(plan);
     for (std::size_t k = 0; k < stack.layer_count(); ++k)
         if (auto ok = mark_layer(m, stack, k, deep->tree); !ok) return ok.error();
     deep->tree.grade();
@@ -226,28 +231,77 @@ private:
     std::vector<std::uint8_t> upper_valid_, lower_valid_, present_, tint_;
 };
 
-// Imagery where there is any, tint elsewhere, nothing over absent cells.
-void compose_row(const CellRows& cells, const Lattice& lattice, double cells_per_texel, std::int64_t width,
-                 bool imagery, std::uint8_t* texels) {
-    const std::uint8_t* present = cells.present();
-    const std::uint8_t* tint = cells.tint();
-    const auto per_cell = static_cast<std::int64_t>(std::llround(1 / std::min(cells_per_texel, 1.0)));
-    std::int64_t c = 0;
-    for (std::int64_t cell = 0; cell < lattice.cells_x && c < width;) {
-        const std::int64_t run = std::min(per_cell, width - c);
-        if (present[cell] == 0) {
-            std::memset(texels + 4 * c, 0, static_cast<std::size_t>(4 * run));
-        } else {
-            for (std::int64_t k = c; k < c + run; ++k)
-                if (!imagery || texels[4 * k + 3] < 128)
-                    std::memcpy(texels + 4 * k, tint + 4 * cell, 4);
-                else
-                    texels[4 * k + 3] = 255;
+// Which texels of a row show terrain: by the cells of the dense part, and under refined tiles by those of the leaves.
+class TexelPresence {
+public:
+    TexelPresence(const MosaicPlan& plan, const DeepPart* deep, double texels_a_cell, std::int64_t width)
+        : plan_(plan),
+          base_(plan.base_lattice()),
+          deep_(deep),
+          texels_a_cell_(texels_a_cell),
+          present_(static_cast<std::size_t>(width)) {}
+
+    /// Row r; `cells`: presence of the dense cells under it.
+    std::span<const std::uint8_t> row(std::int64_t r, const std::uint8_t* cells) {
+        const auto width = static_cast<std::int64_t>(present_.size());
+        const auto run = static_cast<std::int64_t>(texels_a_cell_);
+        for (std::int64_t c = 0; c < width; ++c) {
+            const std::int64_t cell = c / run;
+            present_[static_cast<std::size_t>(c)] = cell < base_.cells_x ? cells[cell] : std::uint8_t{0};
         }
-        c += run;
-        cell += 1;
+        if (deep_ != nullptr) look_deeper(r, run);
+        return present_;
     }
-    std::memset(texels + 4 * c, 0, static_cast<std::size_t>(4 * (width - c)));
+
+private:
+    void look_deeper(std::int64_t r, std::int64_t run) {
+        const std::int64_t m = base_.tile_cells(), y = r / run / m;
+        const std::int64_t columns = (base_.cells_x + m - 1) / m;
+        for (std::int64_t x = 0; x < columns; ++x) {
+            const TileId tile{base_.deepest_level, x, y};
+            if (!deep_->tree.refined(tile)) continue;
+            const std::int64_t end = std::min((x + 1) * m, base_.cells_x) * run;
+            for (std::int64_t c = x * m * run; c < end; ++c)
+                present_[static_cast<std::size_t>(c)] = present(tile, c, r) ? 1 : 0;
+        }
+    }
+
+    // The cell, of whichever leaf, that the texel's centre lies in.
+    bool present(TileId tile, std::int64_t c, std::int64_t r) const {
+        const double scale = std::ldexp(1.0, plan_.base_shift) / texels_a_cell_;
+        const auto i = static_cast<std::int64_t>((static_cast<double>(c) + 0.5) * scale),
+                   j = static_cast<std::int64_t>((static_cast<double>(r) + 0.5) * scale);
+        const Lattice& l = plan_.lattice;
+        while (deep_->tree.refined(tile)) {
+            const std::int64_t extent = l.tile_extent(tile.level + 1);
+            tile = {tile.level + 1, i / extent, j / extent};
+        }
+        const LatticePoint corner = l.corner(tile);
+        const std::int64_t step = l.step(tile.level);
+        return deep_->presence.present(
+            tile, static_cast<std::size_t>((j - corner.j) / step * l.tile_cells() + (i - corner.i) / step));
+    }
+
+    const MosaicPlan& plan_;
+    Lattice base_;
+    const DeepPart* deep_;
+    double texels_a_cell_;
+    std::vector<std::uint8_t> present_;
+};
+
+// Imagery where there is any, tint elsewhere, nothing over absent cells.
+void compose_row(std::span<const std::uint8_t> present, const std::uint8_t* tint, std::int64_t texels_a_cell,
+                 bool imagery, std::uint8_t* texels) {
+    const auto width = static_cast<std::int64_t>(present.size());
+    for (std::int64_t c = 0; c < width; ++c) {
+        std::uint8_t* texel = texels + 4 * c;
+        if (present[static_cast<std::size_t>(c)] == 0)
+            std::memset(texel, 0, 4);
+        else if (!imagery || texel[3] < 128)
+            std::memcpy(texel, tint + 4 * (c / texels_a_cell), 4);
+        else
+            texel[3] = 255;
+    }
 }
 
 // Rows of RGBA texels of the imagery, in order; alpha 0 where it has none.
@@ -259,6 +313,7 @@ struct TextureStage {
     HeightSpool& spool;
     const HeightQuantizer& quantizer;
     const HeightPyramidResult& heights;
+    const DeepPart* deep;
     SqliteStoreWriter& writer;
     Progress& progress;
     const std::atomic<bool>& stop;
@@ -267,10 +322,13 @@ struct TextureStage {
 Result<std::int64_t> compose_textures(TextureStage& s, const TexelRows& imagery) {
     const Dataset& d = s.plan.dataset;
     const Lattice lattice = s.plan.mosaic.base_lattice();
-    TexturePyramid pyramid({&s.writer, lattice, d.texture_size_log2, d.texture_deepest_level, &s.heights.tiles});
+    TexturePyramid pyramid({&s.writer, lattice, d.texture_size_log2, d.texture_deepest_level, &s.heights.tiles,
+                            s.deep != nullptr ? &s.deep->presence : nullptr});
     const double cells_per_texel = d.texel_m(d.texture_deepest_level) / lattice.spacing_m;  // a power of two, <= 1
     CellRows cells(s.spool, s.quantizer, {d.min_height_m, d.max_height_m, lattice.spacing_m});
     const std::int64_t row_bytes = pyramid.width() * 4;
+    const auto texels_a_cell = static_cast<std::int64_t>(std::llround(1 / cells_per_texel));
+    TexelPresence presence(s.plan.mosaic, s.deep, static_cast<double>(texels_a_cell), pyramid.width());
     const double pixels_per_row = image_megapixels(s.plan) / static_cast<double>(pyramid.height());
     for (std::int64_t r = 0; r < pyramid.height(); r += pyramid.rows_per_push()) {
         if (s.stop) return interrupted();
@@ -284,7 +342,8 @@ Result<std::int64_t> compose_textures(TextureStage& s, const TexelRows& imagery)
             if (imagery)
                 if (auto ok = imagery(r + k, {texels, static_cast<std::size_t>(row_bytes)}); !ok) return ok.error();
             if (auto ok = cells.move_to(cell_row); !ok) return ok.error();
-            compose_row(cells, lattice, cells_per_texel, pyramid.width(), static_cast<bool>(imagery), texels);
+            compose_row(presence.row(r + k, cells.present()), cells.tint(), texels_a_cell, static_cast<bool>(imagery),
+                        texels);
         }
         if (auto ok = pyramid.push(); !ok) return ok.error();
         s.progress.add(pixels_per_row * pyramid.rows_per_push());
@@ -413,7 +472,8 @@ Result<BuildReport> build_store(BuildPlan plan, const BuildOptions& options, con
                                              progress.add(static_cast<double>(width) / 1e6);
                                              return !stop.load();
                                          },
-                                         deep ? &deep->tree : nullptr, deep ? &*deep->heights : nullptr, d.lattice});
+                                         deep ? &deep->tree : nullptr, deep ? &*deep->heights : nullptr,
+                                         deep ? &deep->presence : nullptr, d.lattice});
     if (!heights) return heights.error().code == ErrorCode::interrupted ? interrupted() : heights.error();
     if (heights->tile_count == 0)
         return Error{ErrorCode::input,
@@ -428,7 +488,7 @@ Result<BuildReport> build_store(BuildPlan plan, const BuildOptions& options, con
     d.present_cells = heights->present_cells;
     if (heights->coarsest_leaf_level < d.lattice.deepest_level) d.coarsest_leaf_level = heights->coarsest_leaf_level;
 
-    TextureStage stage{plan, options, **spool, *quantizer, *heights, **writer, progress, stop};
+    TextureStage stage{plan, options, **spool, *quantizer, *heights, deep.get(), **writer, progress, stop};
     auto textures = build_textures(stage);
     if (!textures) return textures.error();
     d.texture_tiles = *textures;

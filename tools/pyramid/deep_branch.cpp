@@ -43,6 +43,11 @@ public:
     bool valid(std::int64_t i, std::int64_t j) const {
         return i - i0_ < columns_ && j - j0_ < rows_ && valid_[index(i, j)] != 0;
     }
+    // The samples at the ends of the base edge, or at the corners of the base cell, that the point lies on.
+    bool valid_around(const BasePlace& p) const {
+        const std::int64_t i1 = p.i + (p.east > 0 ? 1 : 0), j1 = p.j + (p.south > 0 ? 1 : 0);
+        return valid(p.i, p.j) && valid(i1, p.j) && valid(p.i, j1) && valid(i1, j1);
+    }
     double between(const BasePlace& p) const {
         const double north = value(p.i, p.j) * (1 - p.east) + value(p.i + 1, p.j) * p.east;
         const double south = value(p.i, p.j + 1) * (1 - p.east) + value(p.i + 1, p.j + 1) * p.east;
@@ -61,7 +66,8 @@ private:
 }  // namespace
 
 Result<void> DeepHeights::sample(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
-                                 std::int64_t stride, std::span<std::int32_t> out, double& worst_error_m) const {
+                                 std::int64_t stride, std::span<std::int32_t> out, std::span<std::uint8_t> valid,
+                                 double& worst_error_m) const {
     std::vector<double> values(out.size());
     if (auto ok = grid_.sample(i, j, columns, rows, stride, values); !ok) return ok;
     auto window = BaseWindow::read(base_, i, j, i + (columns - 1) * stride, j + (rows - 1) * stride, shift_);
@@ -71,15 +77,13 @@ Result<void> DeepHeights::sample(std::int64_t i, std::int64_t j, std::int64_t co
             const auto k = static_cast<std::size_t>(r * columns + c);
             const BasePlace p = base_place(i + c * stride, j + r * stride, shift_);
             double value = values[k];
-            bool valid = std::isfinite(value);
-            if (p.east == 0 && p.south == 0) {
-                value = window->value(p.i, p.j);
-                valid = window->valid(p.i, p.j);
-            } else if (!valid) {
+            if (p.east == 0 && p.south == 0)
+                value = window->value(p.i, p.j);  // what the tiles above have, filled voids too
+            else if (!std::isfinite(value))
                 value = window->between(p);
-            }
+            valid[k] = std::isfinite(values[k]) || window->valid_around(p) ? 1 : 0;
             out[k] = quantizer_.quantize(value);
-            if (valid) worst_error_m = std::max(worst_error_m, quantizer_.error_m(value));
+            if (valid[k] != 0) worst_error_m = std::max(worst_error_m, quantizer_.error_m(value));
         }
     return {};
 }
@@ -117,17 +121,34 @@ HeightBounds bounds_over(std::span<const HeightBounds> children, std::span<const
     return bounds;
 }
 
-// On the way down: what the tiles above can draw over this one, and which base cells are present.
+void DeepPresence::note_leaf(TileId leaf, std::span<const std::uint8_t> cells) {
+    if (cells.empty()) return;
+    std::vector<bool> bits(cells.size());
+    for (std::size_t k = 0; k < cells.size(); ++k) bits[k] = cells[k] != 0;
+    const std::lock_guard lock(mutex_);
+    partial_.emplace(leaf, std::move(bits));
+}
+
+void DeepPresence::note_stored(TileId id) {
+    if (id.level > deepest_noted_level_) return;
+    const std::lock_guard lock(mutex_);
+    stored_.insert(id);
+}
+
+bool DeepPresence::present(TileId leaf, std::size_t cell) const {
+    const auto found = partial_.find(leaf);
+    return found == partial_.end() || found->second[cell];
+}
+
+// On the way down: what the tiles above can draw over this one.
 struct DeepBranches::Place {
     TileId base;
-    std::span<const std::uint8_t> presence;         // of the base tile's cells
     const std::vector<AncestorBlock>* base_blocks;  // levels 0 .. base level
     std::vector<BlockVertices> deep_blocks;         // levels base + 1 .. this tile's parent
 };
 
-Result<DeepBranches::Children> DeepBranches::build(TileId base_tile, std::span<const std::uint8_t> presence,
-                                                   const std::vector<AncestorBlock>& blocks) const {
-    return children(base_tile, Place{base_tile, presence, &blocks, {}});
+Result<DeepBranches::Children> DeepBranches::build(TileId base_tile, const std::vector<AncestorBlock>& blocks) const {
+    return children(base_tile, Place{base_tile, &blocks, {}});
 }
 
 Result<DeepBranches::Children> DeepBranches::children(TileId id, const Place& place) const {
@@ -159,27 +180,29 @@ Result<BranchSummary> DeepBranches::leaf(TileId id, const Place& place) const {
     summary.leaf = true;
     summary.coarsest_leaf = id.level;
     HeightTile tile;
-    if (!place.presence.empty()) {
-        tile.presence.resize(static_cast<std::size_t>(m * m));
-        for (std::int64_t r = 0; r < m; ++r)
-            for (std::int64_t c = 0; c < m; ++c) {
-                const std::uint8_t present =
-                    place.presence[static_cast<std::size_t>(((in_base_j + r) >> up) * m + ((in_base_i + c) >> up))];
-                tile.presence[static_cast<std::size_t>(r * m + c)] = present;
-                summary.present_cells += present;
-            }
-        if (summary.present_cells == 0) return summary;
-        if (summary.present_cells == m * m) tile.presence.clear();
-    } else {
-        summary.present_cells = m * m;
-    }
-    summary.exists = true;
     tile.samples.resize(static_cast<std::size_t>(side * side));
+    std::vector<std::uint8_t> valid(tile.samples.size());
     const LatticePoint corner = lattice_.corner(id);
-    if (auto ok = heights_.sample(corner.i, corner.j, side, side, lattice_.step(id.level), tile.samples,
-                                  summary.worst_quantum_error_m);
+    const std::int64_t step = lattice_.step(id.level);
+    if (auto ok =
+            heights_.sample(corner.i, corner.j, side, side, step, tile.samples, valid, summary.worst_quantum_error_m);
         !ok)
         return ok.error();
+    tile.presence.resize(static_cast<std::size_t>(m * m));
+    for (std::int64_t r = 0; r < m; ++r)
+        for (std::int64_t c = 0; c < m; ++c) {
+            const std::uint8_t* v = valid.data() + r * side + c;
+            const bool inside =
+                corner.i + (c + 1) * step <= lattice_.cells_x && corner.j + (r + 1) * step <= lattice_.cells_y;
+            const auto present = static_cast<std::uint8_t>(inside ? v[0] & v[1] & v[side] & v[side + 1] : 0);
+            tile.presence[static_cast<std::size_t>(r * m + c)] = present;
+            summary.present_cells += present;
+        }
+    if (summary.present_cells == m * m) tile.presence.clear();
+    presence_.note_leaf(id, tile.presence);
+    if (summary.present_cells == 0) return summary;
+    summary.exists = true;
+    presence_.note_stored(id);
     const auto vertices = present_vertices(tile.presence, n);
     const FinestVertices finest{tile.samples.data(), vertices.empty() ? nullptr : vertices.data(), n};
     const auto [low, high] = std::minmax_element(tile.samples.begin(), tile.samples.end());
@@ -219,8 +242,10 @@ Result<BranchSummary> DeepBranches::refined(TileId id, const Place& place) const
     HeightTile tile;
     tile.samples.resize(static_cast<std::size_t>(side * side));
     const LatticePoint corner = lattice_.corner(id);
+    std::vector<std::uint8_t> valid(tile.samples.size());
     double unused = 0;
-    if (auto ok = heights_.sample(corner.i, corner.j, side, side, lattice_.step(id.level), tile.samples, unused); !ok)
+    if (auto ok = heights_.sample(corner.i, corner.j, side, side, lattice_.step(id.level), tile.samples, valid, unused);
+        !ok)
         return ok.error();
     Place below = place;
     BlockVertices block{};

@@ -5,7 +5,10 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <mutex>
 #include <span>
+#include <unordered_map>
+#include <unordered_set>
 #include <vector>
 
 #include "common/dataset.h"
@@ -25,10 +28,11 @@ public:
     DeepHeights(const HeightGrid& grid, const HeightSpool& base, const HeightQuantizer& quantizer, int shift)
         : grid_(grid), base_(base), quantizer_(quantizer), shift_(shift) {}
 
-    /// Points (i + c * stride, j + r * stride), row-major, in quanta. `worst_error_m` grows to the greatest rounding of
-    /// a value that is valid.
+    /// Points (i + c * stride, j + r * stride), row-major, in quanta, and one byte a point, 1 = valid: a layer has a
+    /// value there, or the base's samples around it are valid (a void that was filled). `worst_error_m` grows to the
+    /// greatest rounding of a valid value.
     Result<void> sample(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows, std::int64_t stride,
-                        std::span<std::int32_t> out, double& worst_error_m) const;
+                        std::span<std::int32_t> out, std::span<std::uint8_t> valid, double& worst_error_m) const;
 
 private:
     const HeightGrid& grid_;
@@ -57,22 +61,44 @@ struct BranchSummary {
     double worst_quantum_error_m = 0;
 };
 
+/// Which cells of the leaves under refined base tiles are present, and which tiles are stored there: what the textures
+/// must know of them.
+class DeepPresence {
+public:
+    explicit DeepPresence(int deepest_noted_level) : deepest_noted_level_(deepest_noted_level) {}
+
+    /// `cells`: one byte a cell; empty: every cell is present. Any thread.
+    void note_leaf(TileId leaf, std::span<const std::uint8_t> cells);
+    /// A stored tile; noted down to the level given. Any thread.
+    void note_stored(TileId id);
+
+    /// Of a leaf's cell, row-major. After the last note.
+    bool present(TileId leaf, std::size_t cell) const;
+    bool stored(TileId id) const { return stored_.count(id) != 0; }
+
+private:
+    int deepest_noted_level_;
+    std::mutex mutex_;
+    std::unordered_map<TileId, std::vector<bool>, TileIdHash> partial_;
+    std::unordered_set<TileId, TileIdHash> stored_;
+};
+
 /// Takes finished tiles; called from several threads.
 using TileSink = std::function<Result<void>(TileId id, const std::vector<std::uint8_t>& payload)>;
 
 class DeepBranches {
 public:
     /// `lattice`: the finest one. The referenced objects must outlive it.
-    DeepBranches(const Lattice& lattice, const DeepTree& tree, const DeepHeights& heights, TileSink sink)
-        : lattice_(lattice), tree_(tree), heights_(heights), sink_(std::move(sink)) {}
+    DeepBranches(const Lattice& lattice, const DeepTree& tree, const DeepHeights& heights, DeepPresence& presence,
+                 TileSink sink)
+        : lattice_(lattice), tree_(tree), heights_(heights), presence_(presence), sink_(std::move(sink)) {}
 
-    /// Builds and stores the children of a refined base tile and all below. `presence`: one byte a base cell, m * m;
-    /// empty: all present. `blocks`: of the base tile's ancestors and (last) its own. Any thread.
+    /// Builds and stores the children of a refined base tile and all below. `blocks`: of the base tile's ancestors and
+    /// (last) its own. Any thread.
     struct Children {
         std::array<BranchSummary, 4> quadrant;
     };
-    Result<Children> build(TileId base_tile, std::span<const std::uint8_t> presence,
-                           const std::vector<AncestorBlock>& blocks) const;
+    Result<Children> build(TileId base_tile, const std::vector<AncestorBlock>& blocks) const;
 
 private:
     struct Place;  // of a tile on the way down
@@ -84,6 +110,7 @@ private:
     Lattice lattice_;
     const DeepTree& tree_;
     const DeepHeights& heights_;
+    DeepPresence& presence_;
     TileSink sink_;
 };
 

@@ -91,7 +91,7 @@ public:
         raw_.resize(static_cast<std::size_t>(lattice_.cells_x + 1));
         row_.resize(levels_.back().samples.size() / static_cast<std::size_t>(m_ + 1));
         if (job.deep_tree != nullptr)
-            branches_.emplace(job.finest, *job.deep_tree, *job.deep_heights,
+            branches_.emplace(job.finest, *job.deep_tree, *job.deep_heights, *job.deep_presence,
                               [this](TileId id, const std::vector<std::uint8_t>& payload) { return put(id, payload); });
     }
 
@@ -209,7 +209,9 @@ private:
         TileRecord record;
         HeightTile tile;
         tile.presence = cell_presence(column, record.present_cells);
-        if (record.present_cells == 0) return record;
+        const TileId id{lattice_.deepest_level, column, band.band};
+        const bool deeper = branches_ && job_.deep_tree->refined(id);
+        if (record.present_cells == 0 && !deeper) return record;
         record.exists = true;
         copy_samples(band, column, tile.samples);
         if (record.present_cells == m_ * m_) tile.presence.clear();
@@ -220,8 +222,7 @@ private:
         record.bounds.min_n = *low;
         record.bounds.max_n = *high;
         const std::int64_t i = column * m_, j = band.band * m_;
-        const TileId id{lattice_.deepest_level, column, band.band};
-        if (branches_ && job_.deep_tree->refined(id)) {
+        if (deeper) {
             record.outcome = deepen(id, tile, record);
             return record;
         }
@@ -257,7 +258,7 @@ private:
             own.vertices[static_cast<std::size_t>(k)] =
                 tile.samples[static_cast<std::size_t>(k / 3 * (m_ / 2) * (m_ + 1) + k % 3 * (m_ / 2))];
         blocks.push_back(own);
-        auto built = branches_->build(id, tile.presence, blocks);
+        auto built = branches_->build(id, blocks);
         if (!built) return built.error();
         BranchSummary all;
         all.min_n = std::numeric_limits<std::int32_t>::max();
@@ -277,6 +278,8 @@ private:
             for (std::size_t level = 0; level < all.ancestor_error.size(); ++level)
                 all.ancestor_error[level] = std::max(all.ancestor_error[level], child.ancestor_error[level]);
         }
+        record.exists = !existing.empty();
+        if (!record.exists) return {};
         record.present_cells = all.present_cells;
         record.ancestor_error = all.ancestor_error;
         record.bounds = bounds_over(existing, tile.samples, all.ancestor_error[static_cast<std::size_t>(id.level)], n_);
@@ -294,8 +297,8 @@ private:
                           [&](std::int64_t x) { records[static_cast<std::size_t>(x)] = make_deepest(band, x); });
         for (std::int64_t x = 0; x < band.columns; ++x) {
             const TileRecord& record = records[static_cast<std::size_t>(x)];
-            if (!record.exists) continue;
             if (!record.outcome) return record.outcome;
+            if (!record.exists) continue;
             if (record.branch) {
                 result_.coarsest_leaf_level = std::min(result_.coarsest_leaf_level, record.branch->coarsest_leaf);
                 result_.min_n = std::min(result_.min_n, record.branch->min_n);

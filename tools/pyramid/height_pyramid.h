@@ -26,6 +26,7 @@ struct HeightPyramidJob {
     /// `finest`, whose cells are this one's divided. Null: nowhere.
     const DeepTree* deep_tree = nullptr;
     const DeepHeights* deep_heights = nullptr;
+    DeepPresence* deep_presence = nullptr;
     Lattice finest{};
 };
 

@@ -160,7 +160,8 @@ struct TexturePyramid::Impl {
             const TileId id{level.id, x, y};
             if (!deep && !exists(id)) return;
             TextureTile tile = assemble(id);
-            if (deep && !any_opaque(tile, job.texture_size_log2)) return;
+            if (deep && !any_opaque(tile, job.texture_size_log2) && !(job.deep != nullptr && job.deep->stored(id)))
+                return;
             tile.child_mask = child_mask(id);
             payloads[static_cast<std::size_t>(x)] =
                 encode_texture_tile(tile, job.texture_size_log2, TextureCodec::split);

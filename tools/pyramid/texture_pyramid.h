@@ -9,6 +9,7 @@
 
 #include "common/dataset.h"
 #include "common/store/sqlite_store.h"
+#include "tools/pyramid/deep_branch.h"
 #include "tools/pyramid/tile_set.h"
 
 namespace scree {
@@ -19,6 +20,7 @@ struct TexturePyramidJob {
     int texture_size_log2 = 8;
     int deepest_level = 0;
     const TileSet* height_tiles = nullptr;  ///< decides which tiles of shared levels exist
+    const DeepPresence* deep = nullptr;     ///< the same for deeper ones, besides what is opaque
 };
 
 class TexturePyramid {

@@ -103,46 +103,28 @@ public:
         return places;
     }
 
-    /// Heights in metres of the points of `box` at a level.
-    Result<std::vector<double>> heights(int level, const PointBox& box) const {
-        std::vector<double> height_m(static_cast<std::size_t>(box.count()));
-        const HeightQuantizer& q = job_.quantizer;
-        if (level > base_level_) {
-            std::vector<std::int32_t> quanta(height_m.size());
-            const std::int64_t stride = lattice_.step(level);
-            double unused = 0;
-            if (auto ok = job_.deep->sample(box.i0 * stride, box.j0 * stride, box.columns(), box.j1 - box.j0 + 1,
-                                            stride, quanta, unused);
-                !ok)
-                return ok.error();
-            std::transform(quanta.begin(), quanta.end(), height_m.begin(),
-                           [&](std::int32_t n) { return q.height_offset_m + n * q.quantum_m; });
-            return height_m;
-        }
-        std::vector<std::uint8_t> valid(height_m.size());
-        if (auto ok = job_.spool.read_window(box.i0, box.j0, box.columns(), box.j1 - box.j0 + 1, height_m, valid); !ok)
-            return ok.error();
-        for (double& v : height_m) v = q.height_offset_m + q.quantize(v) * q.quantum_m;
-        return height_m;
-    }
-
-    /// Which cells of the base are present: box.columns() - 1 a row.
-    Result<std::vector<std::uint8_t>> presence(const PointBox& box) const {
-        std::vector<double> values(static_cast<std::size_t>(box.count()));
-        std::vector<std::uint8_t> valid(values.size());
+    /// The points of `box` at a level: heights in metres, and one byte each, 1 = valid.
+    Result<void> read(int level, const PointBox& box, std::vector<double>& height_m,
+                      std::vector<std::uint8_t>& valid) const {
+        height_m.resize(static_cast<std::size_t>(box.count()));
+        valid.resize(height_m.size());
         const std::int64_t columns = box.columns(), rows = box.j1 - box.j0 + 1;
-        if (auto ok = job_.spool.read_window(box.i0, box.j0, columns, rows, values, valid); !ok) return ok.error();
-        std::vector<std::uint8_t> present;
-        for (std::int64_t r = 0; r + 1 < rows; ++r)
-            for (std::int64_t c = 0; c + 1 < columns; ++c) {
-                const auto k = static_cast<std::size_t>(r * columns + c), below = k + static_cast<std::size_t>(columns);
-                present.push_back(valid[k] & valid[k + 1] & valid[below] & valid[below + 1]);
-            }
-        return present;
+        const HeightQuantizer& q = job_.quantizer;
+        if (level == base_level_) {
+            if (auto ok = job_.spool.read_window(box.i0, box.j0, columns, rows, height_m, valid); !ok) return ok;
+            for (double& v : height_m) v = q.height_offset_m + q.quantize(v) * q.quantum_m;
+            return {};
+        }
+        std::vector<std::int32_t> quanta(height_m.size());
+        const std::int64_t stride = lattice_.step(level);
+        double unused = 0;
+        if (auto ok = job_.deep->sample(box.i0 * stride, box.j0 * stride, columns, rows, stride, quanta, valid, unused);
+            !ok)
+            return ok;
+        std::transform(quanta.begin(), quanta.end(), height_m.begin(),
+                       [&](std::int32_t n) { return q.height_offset_m + n * q.quantum_m; });
+        return {};
     }
-
-    /// Cell of the base over or under a place.
-    std::int64_t base_cell(int level, std::int64_t c) const { return c >> (level - base_level_); }
 
 private:
     int leaf_level(std::int64_t fi, std::int64_t fj) const {
@@ -162,6 +144,13 @@ private:
 struct LevelWindow {
     PointBox box;
     std::vector<double> height_m;
+    std::vector<std::uint8_t> valid;
+
+    bool present(const SurfacePlace& p) const {
+        const auto k = static_cast<std::size_t>((p.cj - box.j0) * box.columns() + p.ci - box.i0);
+        const std::size_t below = k + static_cast<std::size_t>(box.columns());
+        return (valid[k] & valid[k + 1] & valid[below] & valid[below + 1]) != 0;
+    }
 
     // The diagonal goes from the north-west corner where ci + cj is even (common/mesh/tile_patterns.h).
     double surface_at(const SurfacePlace& p) const {
@@ -203,30 +192,22 @@ private:
         Sum sum;
         if (truths->empty()) return sum;
         std::vector<LevelWindow> windows(static_cast<std::size_t>(surface_.levels()));
-        PointBox base;
         for (const Truth& t : *truths)
-            for (const SurfacePlace& p : t.places) {
-                window_of(windows, p).box.add_cell(p.ci, p.cj);
-                base.add_cell(surface_.base_cell(p.level, p.ci), surface_.base_cell(p.level, p.cj));
-            }
-        std::int64_t points = base.count();
+            for (const SurfacePlace& p : t.places) window_of(windows, p).box.add_cell(p.ci, p.cj);
+        std::int64_t points = 0;
         for (const LevelWindow& w : windows) points += w.box.count();
         if (points > kMaxWindow && area.count() > 1) return halves(area);
-        auto present = surface_.presence(base);
-        if (!present) return present.error();
         for (std::size_t k = 0; k < windows.size(); ++k) {
             if (windows[k].box.empty()) continue;
-            auto heights = surface_.heights(surface_.base_level() + static_cast<int>(k), windows[k].box);
-            if (!heights) return heights.error();
-            windows[k].height_m = std::move(*heights);
+            LevelWindow& w = windows[k];
+            if (auto ok = surface_.read(surface_.base_level() + static_cast<int>(k), w.box, w.height_m, w.valid); !ok)
+                return ok.error();
         }
         for (const Truth& t : *truths) {
             double worst = -1;
             for (const SurfacePlace& p : t.places) {
-                const std::int64_t bi = surface_.base_cell(p.level, p.ci), bj = surface_.base_cell(p.level, p.cj);
-                if ((*present)[static_cast<std::size_t>((bj - base.j0) * (base.columns() - 1) + bi - base.i0)] == 0)
-                    continue;
-                worst = std::max(worst, std::abs(window_of(windows, p).surface_at(p) - t.height_m));
+                const LevelWindow& w = window_of(windows, p);
+                if (w.present(p)) worst = std::max(worst, std::abs(w.surface_at(p) - t.height_m));
             }
             if (worst >= 0) sum.add(worst);
         }
