@@ -61,7 +61,7 @@ protected:
             test::write_tiff(directory_.path(name), test::layout_of<std::uint8_t>(kSide, kSide), values.data()));
         return directory_.path(name);
     }
-    static Result<std::unique_ptr<IsolatedDecoder>> open(const std::string& path) {
+    static Result<std::unique_ptr<BandDecoder>> open(const std::string& path) {
         const auto header = read_image_header(path);
         EXPECT_TRUE(header.ok()) << header.error().message;
         return open_isolated_decoder(path, *header, limits());
@@ -74,7 +74,7 @@ protected:
         return limits;
     }
     // Every sample of row r is r + 1.
-    static void expect_rows(IsolatedDecoder& decoder, std::int64_t begin, std::int64_t end) {
+    static void expect_rows(BandDecoder& decoder, std::int64_t begin, std::int64_t end) {
         const auto rows = decoder.decode(begin, end);
         ASSERT_TRUE(rows.ok()) << rows.error().message;
         for (std::int64_t row = begin; row < end; ++row)
@@ -130,7 +130,7 @@ TEST_F(IsolatedDecoders, AnErrorOnOpeningNamesTheFile) {
 }
 
 TEST_F(IsolatedDecoders, ThousandsOfFilesNeedFewProcesses) {
-    std::vector<std::unique_ptr<IsolatedDecoder>> decoders;
+    std::vector<std::unique_ptr<BandDecoder>> decoders;
     const std::string path = file("good.tif");
     for (int i = 0; i < 50; ++i) {
         auto decoder = open(path);
