@@ -92,6 +92,10 @@ ProgramRun run_program(const std::string& program, const std::vector<std::string
     run.seconds = std::chrono::duration<double>(Clock::now() - start).count();
     run.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
     run.peak_rss_bytes = std::int64_t{usage.ru_maxrss} * 1024;
+    const auto seconds = [](timeval t) {
+        return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+    };
+    run.cpu_seconds = seconds(usage.ru_utime) + seconds(usage.ru_stime);
     if (options.standard_output.empty()) run.out = contents_of(out);
     if (options.standard_error.empty()) run.err = contents_of(err);
     ::close(out);

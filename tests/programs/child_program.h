@@ -15,6 +15,7 @@ struct ProgramRun {
     std::string out, err;
     std::int64_t peak_rss_bytes = 0;
     double seconds = 0;
+    double cpu_seconds = 0;  ///< with those of the processes that it waited for
 };
 
 struct ProgramOptions {

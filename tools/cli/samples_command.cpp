@@ -27,6 +27,7 @@
 #include "tools/mosaic/visible_samples.h"
 #include "tools/partial_file.h"
 #include "tools/progress.h"
+#include "tools/source/isolated_decoder.h"
 
 namespace scree {
 namespace {
@@ -304,9 +305,10 @@ Result<void> check_memory(const SamplesOptions& o, const MosaicPlan& plan) {
 
 std::string json_of(const std::vector<Block>& blocks, const MosaicPlan& plan, double seconds) {
     const ProcessUsage usage = process_usage();
+    const DecoderUsage decoders = decoder_usage();
     nlohmann::ordered_json json = {{"seconds", seconds},
-                                   {"cpu_seconds", usage.cpu_seconds},
-                                   {"peak_rss_bytes", usage.peak_rss_bytes},
+                                   {"cpu_seconds", usage.cpu_seconds + decoders.cpu_seconds},
+                                   {"peak_rss_bytes", usage.peak_rss_bytes + decoders.peak_rss_bytes},
                                    {"crs", plan.crs_known ? plan.crs.text() : ""}};
     for (const Block& b : blocks) {
         nlohmann::ordered_json layer = {

@@ -29,6 +29,7 @@
 #include "tools/pyramid/texture_pyramid.h"
 #include "tools/pyramid/tint.h"
 #include "tools/pyramid/warp_error.h"
+#include "tools/source/isolated_decoder.h"
 #include "tools/source/suspect_values.h"
 
 namespace scree {
@@ -498,8 +499,9 @@ Result<BuildReport> build_store(BuildPlan plan, const BuildOptions& options, con
 
     report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     const ProcessUsage usage = process_usage();
-    report.cpu_seconds = usage.cpu_seconds;
-    report.peak_rss_bytes = usage.peak_rss_bytes;
+    const DecoderUsage decoders = decoder_usage();
+    report.cpu_seconds = usage.cpu_seconds + decoders.cpu_seconds;
+    report.peak_rss_bytes = usage.peak_rss_bytes + decoders.peak_rss_bytes;
     report.warp_error_m = warp.greatest_m;
     report.warp_rms_m = warp.rms_m;
     report.source_megapixels = dem_pixels + image_megapixels(plan);

@@ -17,6 +17,8 @@
 #include <geotiff/geotiff.h>
 #include <geotiff/geovalues.h>
 
+#include <proj.h>
+
 namespace scree {
 namespace {
 
@@ -49,22 +51,30 @@ bool is_code(std::optional<std::uint16_t> value) { return value && *value != KvU
 
 bool is_length(double metres) { return std::isfinite(metres) && metres > 0; }
 
-double unit_length_m(std::uint16_t code) {
-    double metres = 1;
-    return GTIFGetUOMLengthInfo(code, nullptr, &metres) == 1 && is_length(metres) ? metres : 1.0;
+// The PROJ context of these keys, which would tell standard error of every code that the registry lacks.
+void* quiet_context(GTIF* keys) {
+    void* context = GTIFGetPROJContext(keys, 1, nullptr);
+    if (context != nullptr) proj_log_level(static_cast<PJ_CONTEXT*>(context), PJ_LOG_NONE);
+    return context;
 }
 
-std::optional<double> registered_unit_m(std::optional<std::uint16_t> projected) {
+double unit_length_m(GTIF* keys, std::uint16_t code) {
+    double metres = 1;
+    return GTIFGetUOMLengthInfoEx(quiet_context(keys), code, nullptr, &metres) == 1 && is_length(metres) ? metres : 1.0;
+}
+
+std::optional<double> registered_unit_m(GTIF* keys, std::optional<std::uint16_t> projected) {
     short registered = 0;
-    if (!is_code(projected) || GTIFGetPCSInfo(*projected, nullptr, nullptr, &registered, nullptr) != 1 ||
+    if (!is_code(projected) ||
+        GTIFGetPCSInfoEx(quiet_context(keys), *projected, nullptr, nullptr, &registered, nullptr) != 1 ||
         registered <= 0)
         return std::nullopt;
-    return unit_length_m(static_cast<std::uint16_t>(registered));
+    return unit_length_m(keys, static_cast<std::uint16_t>(registered));
 }
 
 std::optional<double> unit_of_keys_m(GTIF* keys) {
     const auto unit = short_key(keys, ProjLinearUnitsGeoKey);
-    if (is_code(unit)) return unit_length_m(*unit);
+    if (is_code(unit)) return unit_length_m(keys, *unit);
     double metres = 1;
     if (unit == KvUserDefined && GTIFKeyGetDOUBLE(keys, ProjLinearUnitSizeGeoKey, &metres, 0, 1) == 1 &&
         is_length(metres))
@@ -106,11 +116,13 @@ std::optional<std::string> geographic_wkt(GTIF* keys, const GTIFDefn& defn) {
     const auto gcs = static_cast<std::uint16_t>(defn.GCS);
     const auto datum = static_cast<std::uint16_t>(defn.Datum);
     const auto ellipsoid = static_cast<std::uint16_t>(defn.Ellipsoid);
+    void* context = quiet_context(keys);
     const std::string gcs_name =
-        registered_name([&](char** name) { return GTIFGetGCSInfo(gcs, name, nullptr, nullptr, nullptr); });
-    const std::string datum_name = registered_name([&](char** name) { return GTIFGetDatumInfo(datum, name, nullptr); });
-    const std::string ellipsoid_name =
-        registered_name([&](char** name) { return GTIFGetEllipsoidInfo(ellipsoid, name, nullptr, nullptr); });
+        registered_name([&](char** name) { return GTIFGetGCSInfoEx(context, gcs, name, nullptr, nullptr, nullptr); });
+    const std::string datum_name =
+        registered_name([&](char** name) { return GTIFGetDatumInfoEx(context, datum, name, nullptr); });
+    const std::string ellipsoid_name = registered_name(
+        [&](char** name) { return GTIFGetEllipsoidInfoEx(context, ellipsoid, name, nullptr, nullptr); });
     std::string shift;
     if (defn.TOWGS84Count == 3 || defn.TOWGS84Count == 7) {
         shift = ",TOWGS84[";
@@ -284,7 +296,8 @@ void read_vertical(GTIF* keys, GeotiffCrs& said) {
     const auto unit = short_key(keys, VerticalUnitsGeoKey);
     if (is_code(unit)) {
         double metres = 0;
-        if (GTIFGetUOMLengthInfo(*unit, nullptr, &metres) == 1 && is_length(metres)) said.height_unit_m = metres;
+        if (GTIFGetUOMLengthInfoEx(quiet_context(keys), *unit, nullptr, &metres) == 1 && is_length(metres))
+            said.height_unit_m = metres;
     } else if (crs == 6360) {  // NAVD88 height (ftUS)
         said.height_unit_m = kUsSurveyFoot_m;
     } else if (crs == 8228) {  // NAVD88 height (ft)
@@ -308,7 +321,7 @@ GeotiffCrs read_geotiff_crs(GTIF* keys) {
     if (!said.said) return said;
 
     const auto code = said.geographic ? geographic : projected;
-    const auto registered_m = said.geographic ? std::nullopt : registered_unit_m(projected);
+    const auto registered_m = said.geographic ? std::nullopt : registered_unit_m(keys, projected);
     const auto own_m = said.geographic ? std::nullopt : unit_of_keys_m(keys);
     said.linear_unit_m = own_m.value_or(registered_m.value_or(1));
     const bool overridden = own_m && registered_m && std::abs(*own_m / *registered_m - 1) > 1e-9;

@@ -13,7 +13,7 @@
 #include <string_view>
 #include <vector>
 
-#include <OpenImageIO/half.h>
+#include <Imath/half.h>
 #include <fmt/format.h>
 #include <tiffio.h>
 
@@ -389,6 +389,9 @@ Result<void> read_jpeg2000_header(const std::string& path, ImageHeader& header) 
             return unusable(path, "its bands differ in depth, which its decoder mixes up; store it as a GeoTIFF");
     }
     const int bits = (bytes[42] & 0x7F) + 1;
+    if (bits > 16)
+        return unusable(path,
+                        fmt::format("its samples are {}-bit integers; of JPEG 2000 up to 16 bits are read", bits));
     header.spread_bits = bits % 8 == 0 ? 0 : bits;
     return check_sides(path, header.width, header.height);
 }
@@ -469,9 +472,14 @@ const char* reader_name(ImageKind kind) {
 }
 
 Result<ImageHeader> read_image_header(const std::string& path) {
-    std::error_code status;
-    if (!std::filesystem::exists(path, status)) return unusable(path, "no such file, so there is nothing to read");
-    if (!std::filesystem::is_regular_file(path, status))
+    std::error_code problem;
+    const std::filesystem::file_type type = std::filesystem::status(path, problem).type();
+    if (type == std::filesystem::file_type::not_found)
+        return unusable(path, "no such file, so there is nothing to read");
+    if (type == std::filesystem::file_type::none)
+        return unusable(path, fmt::format("cannot be reached ({})", problem.message()));
+    if (type == std::filesystem::file_type::directory) return unusable(path, "a folder, not an image");
+    if (type != std::filesystem::file_type::regular)
         return unusable(path, "not a regular file, so it cannot be read as an image");
     std::ifstream file(path, std::ios::binary);
     if (!file) return unusable(path, "cannot be opened for reading");

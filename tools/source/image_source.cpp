@@ -16,6 +16,7 @@
 #include "tools/source/colour_rows.h"
 #include "tools/source/grid_file.h"
 #include "tools/source/image_header.h"
+#include "tools/source/isolated_decoder.h"
 #include "tools/source/pixel_decoder.h"
 #include "tools/source/sample_memory.h"
 
@@ -26,6 +27,8 @@ constexpr int kMaxChannels = 1024;
 // Units smaller than this are read several at a time: a call of the decoder costs about as much as decoding 64 KiB.
 constexpr std::int64_t kBandTargetBytes = std::int64_t{1} << 20;
 constexpr std::int64_t kMiB = std::int64_t{1} << 20;
+// Measured: what decoders take for themselves, whatever the size of the image, is below 20 MiB.
+constexpr std::int64_t kDecoderBytes = 64 * kMiB;
 
 Error unusable(const std::string& path, const std::string& what) {
     return {ErrorCode::input, fmt::format("{}: {}", path, what)};
@@ -39,7 +42,7 @@ std::int64_t saturating_product(std::int64_t a, std::int64_t b) {
 // The rows of one decoder, a band at a time.
 class BandRows {
 public:
-    explicit BandRows(std::unique_ptr<PixelDecoder> decoder) : decoder_(std::move(decoder)) {}
+    explicit BandRows(std::unique_ptr<BandDecoder> decoder) : decoder_(std::move(decoder)) {}
 
     const DecodedLayout& layout() const { return decoder_->layout(); }
     std::int64_t unit_rows() const { return unit_rows_; }
@@ -73,20 +76,19 @@ public:
         if (row < band_begin_ || row >= band_end_) {
             if (Result<void> loaded = load_band(row - row % band_rows_); !loaded) return loaded.error();
         }
-        return band_.data() + (row - band_begin_) * row_bytes_;
+        return band_ + (row - band_begin_) * row_bytes_;
     }
 
 private:
     Result<void> load_band(std::int64_t begin) {
         const std::int64_t end = std::min(begin + band_rows_, layout().height);
         band_begin_ = band_end_ = 0;  // a failure leaves nothing that could be taken for pixels
-        try {
-            band_.resize(static_cast<std::size_t>(saturating_product(row_bytes_, end - begin)));
-            if (Result<void> decoded = decoder_->decode(begin, end, band_.data()); !decoded)
-                return unreadable(begin, end, decoded.error().message);
-        } catch (const std::exception& problem) {
-            return unreadable(begin, end, problem.what());
+        const Result<const std::byte*> decoded = decoder_->decode(begin, end);
+        if (!decoded) {
+            if (decoded.error().code != ErrorCode::input) return decoded.error();
+            return unreadable(begin, end, decoded.error().message);
         }
+        band_ = *decoded;
         band_begin_ = begin;
         band_end_ = end;
         return {};
@@ -98,18 +100,18 @@ private:
                             end - 1, layout().height, reason)};
     }
 
-    std::unique_ptr<PixelDecoder> decoder_;
+    std::unique_ptr<BandDecoder> decoder_;
     std::int64_t row_bytes_ = 0;
     std::int64_t unit_rows_ = 1;
     std::int64_t band_rows_ = 1;
-    std::vector<std::byte> band_;  ///< rows [band_begin_, band_end_), all channels, as decoded
+    const std::byte* band_ = nullptr;  ///< the decoder's: rows [band_begin_, band_end_), all channels, as decoded
     std::int64_t band_begin_ = 0;
     std::int64_t band_end_ = 0;
 };
 
 class DecodedSource final : public ImageSource {
 public:
-    DecodedSource(std::string path, ImageHeader header, std::unique_ptr<PixelDecoder> decoder)
+    DecodedSource(std::string path, ImageHeader header, std::unique_ptr<BandDecoder> decoder)
         : path_(std::move(path)), header_(std::move(header)), image_(std::move(decoder)) {}
 
     Result<void> prepare(const OpenOptions& options) {
@@ -142,8 +144,7 @@ public:
         return {};
     }
 
-    Result<void> use_mask(const ImageHeader& header, std::unique_ptr<PixelDecoder> decoder,
-                          const OpenOptions& options) {
+    Result<void> use_mask(const ImageHeader& header, std::unique_ptr<BandDecoder> decoder, const OpenOptions& options) {
         const DecodedLayout& layout = decoder->layout();
         if (layout.width != info_.width || layout.height != info_.height || layout.type != SampleType::u8 ||
             (layout.channels != 1 && layout.channels != info_.channels))
@@ -222,16 +223,21 @@ private:
         assert(0 <= row_begin && row_begin <= row_end && row_end <= info_.height);
         for (std::int64_t row = row_begin; row < row_end; ++row) {
             const Result<const std::byte*> samples = image_.row(row);
-            if (!samples) return unusable(path_, samples.error().message);
+            if (!samples) return about_rows("", samples.error());
             MaskRow mask;
             if (mask_) {
                 const Result<const std::byte*> mask_samples = mask_->row(row);
-                if (!mask_samples) return unusable(path_, "its mask's " + mask_samples.error().message);
+                if (!mask_samples) return about_rows("its mask's ", mask_samples.error());
                 mask = {reinterpret_cast<const std::uint8_t*>(*mask_samples), mask_->layout().channels};
             }
             use(row, *samples, mask);
         }
         return {};
+    }
+
+    // What is not the file's fault (no memory, no decoder program) is said as it is.
+    Error about_rows(const char* whose, const Error& error) const {
+        return error.code == ErrorCode::input ? unusable(path_, whose + error.message) : error;
     }
 
     std::string path_;
@@ -249,10 +255,18 @@ Result<std::unique_ptr<ImageSource>> open_grid(const std::string& path, GridFile
     ImageHeader header;
     header.rows_per_strip = grid.rows_per_unit;
     header.nodata = std::move(grid.nodata);
-    auto source = std::make_unique<DecodedSource>(path, header, std::move(grid.decoder));
+    auto source = std::make_unique<DecodedSource>(path, header, decode_here(std::move(grid.decoder)));
     if (Result<void> prepared = source->prepare(options); !prepared) return prepared.error();
     source->place(std::move(grid.georeference));
     return std::unique_ptr<ImageSource>(std::move(source));
+}
+
+// Whole frames take several times their size while they are decoded.
+DecoderLimits limits_of(const OpenOptions& options) {
+    DecoderLimits limits;
+    if (options.max_unit_bytes < std::numeric_limits<std::int64_t>::max() / 8)
+        limits.memory_bytes = kDecoderBytes + 4 * options.max_unit_bytes;
+    return limits;
 }
 
 Result<void> open_mask(const std::string& path, const ImageHeader& image, const OpenOptions& options,
@@ -260,7 +274,7 @@ Result<void> open_mask(const std::string& path, const ImageHeader& image, const 
     Result<std::optional<ImageHeader>> header = read_mask_header(path, image);
     if (!header) return header.error();
     if (!*header) return {};
-    Result<std::unique_ptr<PixelDecoder>> decoder = make_tiff_decoder(path, **header);
+    Result<std::unique_ptr<BandDecoder>> decoder = open_isolated_decoder(path, **header, limits_of(options));
     if (!decoder) return decoder.error();
     return source.use_mask(**header, std::move(*decoder), options);
 }
@@ -269,6 +283,8 @@ Result<std::unique_ptr<ImageSource>> open_image(const std::string& path, const O
     Result<std::optional<GridFile>> grid = open_grid_file(path);
     if (!grid) return grid.error();
     if (grid->has_value()) return open_grid(path, std::move(**grid), options);
+    const DecoderLimits limits = limits_of(options);
+    if (Result<void> tried = try_headers(path, limits); !tried) return tried.error();
     Result<ImageHeader> header = read_image_header(path);
     if (!header) return header.error();
     if (header->rows_per_strip == header->height && header->height > 0) {
@@ -282,8 +298,7 @@ Result<std::unique_ptr<ImageSource>> open_image(const std::string& path, const O
                     "at least {} MiB for it, or store the file in tiles",
                     header->width, header->height, options.max_unit_bytes / kMiB, least / kMiB + 1));
     }
-    Result<std::unique_ptr<PixelDecoder>> decoder =
-        header->plain_tiff ? make_tiff_decoder(path, *header) : make_openimageio_decoder(path, *header);
+    Result<std::unique_ptr<BandDecoder>> decoder = open_isolated_decoder(path, *header, limits);
     if (!decoder) return decoder.error();
     auto source = std::make_unique<DecodedSource>(path, *header, std::move(*decoder));
     if (Result<void> prepared = source->prepare(options); !prepared) return prepared.error();
@@ -295,12 +310,6 @@ Result<std::unique_ptr<ImageSource>> open_image(const std::string& path, const O
 }
 
 }  // namespace
-
-std::size_t memory_bytes(SampleType type) {
-    std::size_t bytes = 0;
-    with_memory_type(type, [&](auto sample) { bytes = sizeof(sample); });
-    return bytes;
-}
 
 bool is_integer(SampleType type) {
     return type != SampleType::f16 && type != SampleType::f32 && type != SampleType::f64;

@@ -108,6 +108,11 @@ void configure_openimageio() {
 
 }  // namespace
 
+void load_openimageio() {
+    configure_openimageio();
+    (void)OIIO::ImageInput::create("tiff");  // makes the list of readers
+}
+
 Result<std::unique_ptr<PixelDecoder>> make_openimageio_decoder(const std::string& path, const ImageHeader& header) {
     configure_openimageio();
     std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(reader_name(header.kind));

@@ -1,4 +1,5 @@
-// What turns rows of one open file into samples in memory: OpenImageIO for most, libtiff itself for plain TIFFs.
+// What turns rows of one open file into samples in memory: libtiff for TIFFs, our own readers for grids (grid_file.h),
+// OpenImageIO for all others.
 // One thread at a time.
 #pragma once
 
@@ -33,6 +34,22 @@ public:
     /// An Error holds the bare reason; the caller adds file and rows.
     virtual Result<void> decode(std::int64_t begin, std::int64_t end, std::byte* out) = 0;
 };
+
+/// The same with memory of its own for the rows. One thread at a time.
+class BandDecoder {
+public:
+    virtual ~BandDecoder() = default;
+    virtual const DecodedLayout& layout() const = 0;
+    /// Rows [begin, end) as PixelDecoder::decode gives them, in memory that is good until the next call.
+    virtual Result<const std::byte*> decode(std::int64_t begin, std::int64_t end) = 0;
+};
+
+/// In this process: for readers of our own, which check all that a file claims. Others run apart
+/// (isolated_decoder.h).
+std::unique_ptr<BandDecoder> decode_here(std::unique_ptr<PixelDecoder> decoder);
+
+/// What every file needs of OpenImageIO, ahead of the first one.
+void load_openimageio();
 
 /// Both return Errors (ErrorCode::input) with whole messages. make_tiff_decoder needs header.plain_tiff.
 Result<std::unique_ptr<PixelDecoder>> make_tiff_decoder(const std::string& path, const ImageHeader& header);

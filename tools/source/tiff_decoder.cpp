@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include <OpenImageIO/half.h>
+#include <Imath/half.h>
 #include <fmt/format.h>
 #include <tiffio.h>
 

@@ -1,0 +1,6 @@
+// scree-decoder: plain TIFFs by libtiff; headers of everything.
+#include "tools/source/decoder_server.h"
+
+int main() {
+    return scree::serve_decoders({[] {}, scree::make_tiff_decoder});
+}
