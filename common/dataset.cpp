@@ -79,6 +79,10 @@ private:
     std::string problem_;
 };
 
+bool is_fingerprint(const std::string& text) {
+    return text.size() == 16 && text.find_first_not_of("0123456789abcdef") == std::string::npos;
+}
+
 }  // namespace
 
 double Dataset::texel_m(int level) const {
@@ -118,9 +122,11 @@ Result<void> Dataset::check() const {
 
 std::string dataset_to_json(const Dataset& d) {
     Json sources = Json::array();
-    for (const SourceRecord& s : d.sources)
+    for (const SourceRecord& s : d.sources) {
         sources.push_back(
             {{"name", s.name}, {"role", s.role}, {"bytes", s.bytes}, {"width", s.width}, {"height", s.height}});
+        if (!s.fingerprint.empty()) sources.back()["fingerprint"] = s.fingerprint;
+    }
     Json json = {{"format_version", kFormatVersion},
                  {"origin_x_m", d.lattice.origin_x_m},
                  {"origin_y_m", d.lattice.origin_y_m},
@@ -198,7 +204,10 @@ Result<Dataset> dataset_from_json(const std::string& text) {
             source.read("bytes", record.bytes);
             source.read("width", record.width);
             source.read("height", record.height);
+            if (item.contains("fingerprint")) source.read("fingerprint", record.fingerprint);
             if (!source.problem().empty()) return store_error("dataset: source " + source.problem());
+            if (item.contains("fingerprint") && !is_fingerprint(record.fingerprint))
+                return store_error("dataset: source 'fingerprint' is not 16 hexadecimal digits");
             d.sources.push_back(std::move(record));
         }
     }

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/report.h"
+#include "tools/cli/dataset_label.h"
 #include "tools/cli/height_options.h"
 #include "tools/pyramid/builder.h"
 #include "tools/source/number_text.h"
@@ -32,10 +33,10 @@ void print_plan(const BuildPlan& plan) {
     const Lattice& l = d.lattice;
     note("lattice: {} x {} cells of {} m, {} levels, {} x {} root{}{}\n", l.cells_x, l.cells_y, l.spacing_m,
          l.deepest_level + 1, l.root_rows, l.root_columns, l.root_rows * l.root_columns == 1 ? "" : "s",
-         d.crs.empty() ? "" : ", " + d.crs);
+         d.crs.empty() ? "" : ", " + crs_label(d));
     const MosaicPlan& m = plan.mosaic;
     if (!m.crs_reason.empty()) note("CRS: {}\n", m.crs_reason);
-    if (!m.heights_copied) note("heights are resampled: their samples are no square grid of {}\n", d.crs);
+    if (!m.heights_copied) note("heights are resampled: their samples are no square grid of {}\n", crs_label(d));
     for (const std::string& warning : m.warnings) note("warning: {}\n", warning);
     note("textures: {} levels, {} m a texel; memory: about {} MiB\n", d.texture_deepest_level + 1,
          d.texel_m(d.texture_deepest_level), plan.memory_bytes >> 20);

@@ -12,6 +12,7 @@
 #include "tools/pyramid/height_spool.h"
 #include "tools/pyramid/imagery_rows.h"
 #include "tools/pyramid/texture_pyramid.h"
+#include "tools/source/fingerprint.h"
 #include "tools/source/isolated_decoder.h"
 
 namespace scree {
@@ -117,8 +118,12 @@ void plan_resources(const BuildOptions& o, BuildPlan& plan) {
 SourceRecord source_record(const std::string& path, const char* role, const ImageInfo& info) {
     std::error_code error;
     const auto bytes = std::filesystem::file_size(path, error);
-    return {std::filesystem::path(path).filename().string(), role, error ? 0 : static_cast<std::int64_t>(bytes),
-            info.width, info.height};
+    return {std::filesystem::path(path).filename().string(),
+            role,
+            error ? 0 : static_cast<std::int64_t>(bytes),
+            info.width,
+            info.height,
+            fingerprint_of(path)};
 }
 
 }  // namespace

@@ -297,6 +297,18 @@ Object reopen(PJ_CONTEXT* context, const Crs& crs) {
 
 }  // namespace
 
+std::string Crs::esri_wkt() const {
+    const Context context = proj::make_context();
+    const Object crs = context ? reopen(context.get(), *this) : nullptr;
+    if (!crs) return {};
+    const std::array<const char*, 2> options = {"MULTILINE=NO", nullptr};
+    const char* text = proj_as_wkt(context.get(), crs.get(), PJ_WKT1_ESRI, options.data());
+    if (text == nullptr) return {};
+    const std::string wkt = text;
+    const Object again = proj::create_crs(context.get(), wkt);
+    return again && proj::equivalent(context.get(), again.get(), crs.get()) ? wkt : std::string();
+}
+
 bool Crs::same_as(const Crs& other) const {
     if (impl_ == other.impl_ || text() == other.text()) return true;
     const Context context = proj::make_context();

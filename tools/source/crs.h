@@ -28,6 +28,8 @@ public:
     double turn() const;                  ///< of a geographic CRS: once around in its units, 360 for degrees; else 0
     double metres_per_unit() const;       ///< of a projected CRS (1 for degrees)
     bool east_north() const;              ///< its axes count to the east and north (or are polar), not to the west
+    /// WKT 1 as ESRI writes it into .prj files and most programs read; empty where that cannot say the same.
+    std::string esri_wkt() const;
     /// The same horizontal CRS, axis order and names aside.
     bool same_as(const Crs& other) const;
 
