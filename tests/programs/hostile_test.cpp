@@ -289,13 +289,15 @@ protected:
 
 TEST_F(OddInputs, WhatIsNoRegularFileIsRefusedAtOnce) {
     const std::string fifo = folder_.file("fifo.tif"), loop = folder_.file("loop.tif"), empty = folder_.file("e.tif");
+    const std::string folder = folder_.file("folder");
     ASSERT_EQ(::mkfifo(fifo.c_str(), 0600), 0);
     ASSERT_EQ(::symlink(loop.c_str(), loop.c_str()), 0);
     std::ofstream(empty).close();
+    std::filesystem::create_directory(folder);
     expect_refused(fifo, "not a regular file");
     expect_refused(loop, "cannot be reached");
     expect_refused(empty, "the file is empty");
-    expect_refused(folder_.file(""), "a folder");
+    expect_refused(folder, "no raster of a known kind");
     expect_refused(folder_.file("missing.tif"), "no such file");
     expect_refused("/dev/zero", "not a regular file");
     expect_refused("/dev/null", "not a regular file");
