@@ -108,7 +108,8 @@ protected:
         // This one is sound, and of 140 million samples.
         EXPECT_TRUE(kSanitized || run.cpu_seconds <= kLimit_s || file.ends_with("arcgis93_geodataxform_gcp.tif"))
             << run.cpu_seconds;
-        EXPECT_TRUE(run.exit_code == 0 || run.exit_code == 2 || run.exit_code == 3) << describe(run);
+        const bool too_large_here = run.exit_code == 5 && run.err.find(" MB are free") != std::string::npos;
+        EXPECT_TRUE(run.exit_code == 0 || run.exit_code == 2 || run.exit_code == 3 || too_large_here) << describe(run);
         if (run.exit_code == 3) {
             // The file itself, the world file beside it, or heights in units that were taken over from it.
             const std::string stem = std::filesystem::path(file).replace_extension();
