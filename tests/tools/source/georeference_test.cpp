@@ -245,6 +245,20 @@ TEST(Georeference, ControlPointsAloneAreRefusedWithTheirNumber) {
     EXPECT_EQ((*read)->crs, "EPSG:32633");
 }
 
+// The registry's own library would report it to standard error by itself.
+TEST(Georeference, AnUnknownUnitIsTakenForMetresInSilence) {
+    const TempDirectory directory;
+    TestTiff tiff = placed();
+    tiff.linear_unit = 9999;
+    const std::string path = directory.path("u.tif");
+    ASSERT_TRUE(test::write_tiff(path, tiff, kPixels.data()));
+    ::testing::internal::CaptureStderr();
+    const auto read = read_georeference(path);
+    EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+    ASSERT_TRUE(read.ok() && read->has_value());
+    EXPECT_EQ((*read)->linear_unit_m, 1);
+}
+
 TEST(Georeference, AProjectionFileFillsInForMissingKeysOnly) {
     const TempDirectory directory;
     TestTiff tiff = placed();
@@ -272,7 +286,8 @@ TEST(Georeference, AGeographicFileSaysDegrees) {
 
 TEST(Georeference, AZeroOrInfiniteStepIsAnErrorThatNamesTheFile) {
     const TempDirectory directory;
-    for (const double step : {0.0, 1e16, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
+    for (const double step :
+         {0.0, 1e16, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
         TestTiff tiff = placed();
         tiff.scale = {step, 20, 0};
         const std::string path = directory.path("absurd.tif");
