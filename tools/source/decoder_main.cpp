@@ -1,4 +1,4 @@
-// scree-decoder: plain TIFFs by libtiff; headers of everything.
+// scree-decoder: TIFFs by libtiff; headers of everything.
 #include "tools/source/decoder_server.h"
 
 int main() {
