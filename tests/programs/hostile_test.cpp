@@ -108,7 +108,8 @@ protected:
         // This one is sound, and of 140 million samples.
         EXPECT_TRUE(kSanitized || run.cpu_seconds <= kLimit_s || file.ends_with("arcgis93_geodataxform_gcp.tif"))
             << run.cpu_seconds;
-        EXPECT_TRUE(run.exit_code == 0 || run.exit_code == 2 || run.exit_code == 3) << describe(run);
+        const bool too_large_here = run.exit_code == 5 && run.err.find(" MB are free") != std::string::npos;
+        EXPECT_TRUE(run.exit_code == 0 || run.exit_code == 2 || run.exit_code == 3 || too_large_here) << describe(run);
         if (run.exit_code == 3) {
             // The file itself, the world file beside it, or heights in units that were taken over from it.
             const std::string stem = std::filesystem::path(file).replace_extension();
@@ -289,13 +290,15 @@ protected:
 
 TEST_F(OddInputs, WhatIsNoRegularFileIsRefusedAtOnce) {
     const std::string fifo = folder_.file("fifo.tif"), loop = folder_.file("loop.tif"), empty = folder_.file("e.tif");
+    const std::string folder = folder_.file("folder");
     ASSERT_EQ(::mkfifo(fifo.c_str(), 0600), 0);
     ASSERT_EQ(::symlink(loop.c_str(), loop.c_str()), 0);
     std::ofstream(empty).close();
+    std::filesystem::create_directory(folder);
     expect_refused(fifo, "not a regular file");
     expect_refused(loop, "cannot be reached");
     expect_refused(empty, "the file is empty");
-    expect_refused(folder_.file(""), "a folder");
+    expect_refused(folder, "no raster of a known kind");
     expect_refused(folder_.file("missing.tif"), "no such file");
     expect_refused("/dev/zero", "not a regular file");
     expect_refused("/dev/null", "not a regular file");

@@ -86,7 +86,8 @@ Result<std::vector<std::string>> list_sources(const std::vector<std::string>& pa
     for (const std::string& path : paths) {
         std::error_code status;
         const fs::file_status facts = fs::status(path, status);
-        if (!fs::exists(facts)) return unusable(path, "no such file or folder");
+        if (facts.type() == fs::file_type::not_found) return unusable(path, "no such file or folder");
+        if (!fs::status_known(facts)) return unusable(path, fmt::format("cannot be reached ({})", status.message()));
         if (!fs::is_directory(facts)) {
             sources.push_back(path);
             continue;

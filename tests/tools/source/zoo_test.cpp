@@ -288,7 +288,9 @@ TEST(ZooAgainstGdal, GdalsOwnTestFiles) {
         "byte_nogeoref.tif", "float24.tif", "mandrilmini_12bitjpeg.tif", "uint16_sgilog.tif", "byte_rle8.bmp",
         // tiles without a size, which only GDAL's own convention knows; PackBits that ends early
         "cog_sparse_strile_arrays_zeroified_when_possible.tif", "cog_strile_arrays_zeroified_when_possible.tif",
-        "contig_tiled.tif", "separate_tiled.tif"};
+        "contig_tiled.tif", "separate_tiled.tif",
+        // placed by control points alone
+        "byte_gcp.tif", "byte_gcp_pixelispoint.tif"};
     expect_as_gdal_reads("gdal_gcore/data", differing, refused);
 }
 
