@@ -156,7 +156,7 @@ int run_export(int argc, char** argv) {
     std::string path, heights, imagery, texture, out, box, size, json;
     int level = 0;
     app.add_option("STORE", path, "A .scree file")->required();
-    auto* const what = app.add_option_group("What");
+    auto* const what = app.add_option_group("What", "What to write");
     auto* const heights_option = what->add_option(
         "--heights", heights, "Heights as GeoTIFF of points: integers where all are whole metres, else floats");
     auto* const imagery_option = what->add_option("--imagery", imagery, "Texels as GeoTIFF of areas, RGBA");
