@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kOneSample = 1e-3;  // what may be lost by taking a grid for square or for the lattice's own, samples
 constexpr double kFinerBy = 1.1;     // a layer this much finer than the lattice asks for no finer one
-constexpr double kBranchCost = 2;       // of a point made tile by tile, against one of the dense part
+constexpr double kBranchCost = 2;    // of a point made tile by tile, against one of the dense part
 constexpr double kWarnedScale = 1.001;  // of the CRS against the ground
 
 Error input_error(std::string message) { return {ErrorCode::input, std::move(message)}; }
@@ -331,11 +331,13 @@ private:
     }
 
     // Halvings that are left to single branches: those that make the fewest points in all. `points`: of the finest
-    // lattice, if it were dense.
+    // lattice, if it were dense. None beyond the coarsest layer: what is present is known by cells of the dense part,
+    // and no file's border may be cut back to cells that are larger than any file's own.
     int base_shift(double points, double step) const {
-        int best = 0;
+        int best = 0, most = 0;
+        for (const double cell : cell_sizes_) most = std::max(most, coarser_by(cell, step));
         double least = std::numeric_limits<double>::infinity();
-        for (int shift = 0; shift <= kMaxLevel && std::ldexp(points, -2 * shift) >= 1; ++shift) {
+        for (int shift = 0; shift <= most && std::ldexp(points, -2 * shift) >= 1; ++shift) {
             double cost = std::ldexp(points, -2 * shift);
             for (std::size_t k = 0; k < plan_.height_layers.size(); ++k)
                 if (coarser_by(cell_sizes_[k], step) < shift) cost += kBranchCost * points_of(plan_.height_layers[k]);
