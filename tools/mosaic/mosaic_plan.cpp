@@ -315,10 +315,11 @@ private:
                                            east - west, south - north, step, kMaxCellsPerSide));
         const int shift = base_shift((east - west) * (south - north), step);
         const double unit = std::ldexp(1.0, shift);
-        west = std::floor(west / unit) * unit;
-        north = std::floor(north / unit) * unit;
-        east = std::ceil(east / unit) * unit;
-        south = std::ceil(south / unit) * unit;
+        const auto [i, j] = point_of_coarse_sample(*grid, shift);
+        west = i + std::floor((west - i) / unit) * unit;
+        north = j + std::floor((north - j) / unit) * unit;
+        east = i + std::ceil((east - i) / unit) * unit;
+        south = j + std::ceil((south - j) / unit) * unit;
         auto lattice = make_lattice(grid->x_m + west * step, grid->y_m - north * step, step,
                                     static_cast<std::int64_t>(east - west), static_cast<std::int64_t>(south - north),
                                     request_.tile_cells_log2);
@@ -328,6 +329,20 @@ private:
         for (const double cell : cell_sizes_)
             plan_.layer_level.push_back(std::max(lattice->deepest_level - coarser_by(cell, step), 0));
         return {};
+    }
+
+    // Where the dense part may begin: on a sample of the first layer that is as coarse, if that is a grid point. Listed
+    // after a finer file, it would else fall between the dense part's points and lose its sharpest samples.
+    std::pair<double, double> point_of_coarse_sample(const TargetGrid& grid, int shift) const {
+        for (std::size_t k = 0; k < plan_.height_layers.size(); ++k) {
+            const Layer& layer = plan_.height_layers[k];
+            if (coarser_by(cell_sizes_[k], grid.step_m) < shift || !layer.crs.same_as(plan_.crs)) continue;
+            const double i = (layer.where.first_x - grid.x_m) / grid.step_m,
+                         j = (grid.y_m - layer.where.first_y) / grid.step_m;
+            if (std::abs(i - std::nearbyint(i)) <= kOneSample && std::abs(j - std::nearbyint(j)) <= kOneSample)
+                return {std::nearbyint(i), std::nearbyint(j)};
+        }
+        return {0, 0};
     }
 
     // Halvings that are left to single branches: those that make the fewest points in all. `points`: of the finest
