@@ -118,6 +118,18 @@ TEST_F(Insets, OfThirtyTimesTheResolutionAreSoundAtTheirBorders) {
     EXPECT_NEAR(height_in(store_, base_.x(9, 9), base_.y(9, 9)), land(base_.x(9, 9), base_.y(9, 9), 0), 1.0 / 64);
 }
 
+TEST_F(Insets, OnTheLatticeAreKeptToTheLastSample) {
+    // Its border runs within tiles: along the edge of a coarser leaf that leaf's own would count.
+    const SampleGrid inset = north_up("EPSG:32633", base_.x(41, 0), base_.y(0, 51), 3.75, 113, 113);
+    const std::vector<std::string> files{base(), write("inset", inset, 3)};
+    const auto built = build(files, store_);
+    EXPECT_LT(built.value("warp_error_m", 1e9), 1.0 / 64) << "but for rounding nothing is lost";
+    for (int r = 4; r < 112; r += 4)
+        for (int c = 4; c < 112; c += 4)
+            ASSERT_NEAR(height_in(store_, inset.x(c, r), inset.y(c, r)), land(inset.x(c, r), inset.y(c, r), 3), 0.01)
+                << c << ", " << r;
+}
+
 TEST_F(Insets, TakeNoMoreTilesThanTheirFilesApart) {
     const SampleGrid inset = north_up("EPSG:32633", 451000, 5297000, 1, 2049, 2049);
     const std::string below = base(), above = write("inset", inset, 3);
