@@ -21,7 +21,7 @@ struct SourceRecord {
     std::int64_t width = 0;
     std::int64_t height = 0;
     /// 16 hexadecimal digits (docs/store-format.md, "Dataset"); empty in stores that were made without.
-    std::string fingerprint;
+    std::string fingerprint{};
 };
 
 struct Dataset {

@@ -50,6 +50,25 @@ TEST(DatasetJson, ComesBackExactlyAndIsDeterministic) {
     EXPECT_TRUE(back->has_imagery);
 }
 
+TEST(DatasetJson, FingerprintsOfSourcesMayBeMissingAndAreCheckedWhereTheyStand) {
+    Dataset d = example();
+    EXPECT_EQ(dataset_to_json(d).find("fingerprint"), std::string::npos);
+    d.sources[1].fingerprint = "0123456789abcdef";
+    const std::string text = dataset_to_json(d);
+    const auto back = dataset_from_json(text);
+    ASSERT_TRUE(back.ok()) << back.error().message;
+    EXPECT_EQ(back->sources[0].fingerprint, "");
+    EXPECT_EQ(back->sources[1].fingerprint, "0123456789abcdef");
+    EXPECT_EQ(dataset_to_json(*back), text);
+    for (const char* wrong : {"\"\"", "\"0123456789abcde\"", "\"0123456789ABCDEF\"", "\"0123456789abcdef0\"", "7"}) {
+        std::string bad = text;
+        bad.replace(bad.find("\"0123456789abcdef\""), 18, wrong);
+        const auto refused = dataset_from_json(bad);
+        ASSERT_FALSE(refused.ok()) << wrong;
+        EXPECT_NE(refused.error().message.find("fingerprint"), std::string::npos) << refused.error().message;
+    }
+}
+
 TEST(DatasetJson, TheLevelOfTheCoarsestLeafIsSaidWhereDepthVariesOnly) {
     Dataset d = example();
     EXPECT_EQ(dataset_to_json(d).find("coarsest_leaf_level"), std::string::npos);

@@ -40,6 +40,36 @@ std::string raw_header(const char* layout) {
         layout);
 }
 
+// Three profiles of 2, 150 and 1 values, which start at different rows.
+std::string usgs_dem(const char* system, const char* step_z, const char* record_end) {
+    std::string file(144, ' ');
+    file += fmt::format("     1     1{}", system);
+    file.resize(528, ' ');
+    file += "     2     2     4";
+    file.resize(816, ' ');
+    file += fmt::format("0.300000E+020.300000E+02{}     1     3", step_z);
+    file.resize(888, ' ');
+    file += " 2 1";
+    const bool padded = *record_end == '\0';
+    if (padded) file.resize(1024, ' ');
+    file += record_end;
+    for (const int values : {2, 150, 1}) {
+        static constexpr const char* kStarts[] = {"0.600000000000000D+06", "0.600030000000000D+06",
+                                                  "0.600060000000000D+06"};
+        const std::size_t number = values == 2 ? 1 : values == 1 ? 3 : 2;
+        std::string records =
+            fmt::format("{:6}{:6}{:6}{:6}{:>24}{:>24}{:>24}{:>24}{:>24}", 1, number, values, 1, kStarts[number - 1],
+                        values == 1 ? "0.400003D+07" : "0.4D+07", "0.0", "0", "1");
+        for (int i = 0; i < values; ++i) {
+            if (padded && i == 146) records.resize(1024, ' ');
+            records += fmt::format("{:6}", i % 7 == 1 ? -32767 : i * 31);
+        }
+        if (padded) records.resize((records.size() + 1023) / 1024 * 1024, ' ');
+        file += records + record_end;
+    }
+    return file;
+}
+
 std::string of_kind(std::size_t name, const std::string& content) { return static_cast<char>(name) + content; }
 
 void decode_all(const std::string& path, GridFile& grid) {
@@ -66,6 +96,8 @@ std::vector<std::string> seeds() {
         of_kind(3, raw_header("BIP")),
         of_kind(4, raw_header("BSQ")),
         of_kind(5, "ncols 4\nnrows 5\nxllcorner 1\nyllcorner 2\ncellsize 3\nNODATA_value -9999\nbyteorder MSBFIRST\n"),
+        of_kind(7, usgs_dem("     1    10", "0.100000E+01", "")),
+        of_kind(7, usgs_dem("     1    10", "0.100000E+00", "\r\n")),
         of_kind(8,
                 "ENVI\ndescription = {\n x}\nsamples = 4\nlines = 3\nbands = 2\nheader offset = 1\ndata type = 2\n"
                 "interleave = bil\nbyte order = 1\nmap info = {UTM, 1, 1, 5, 6, 7, 8, 33, North, WGS-84}\n"

@@ -53,13 +53,25 @@ TEST(RealData, PugetSoundWithItsTexture) {
     EXPECT_EQ(info["height_quantum_error_m"], 0.0);
 }
 
+TEST(RealData, AQuadThatIsSlantedAgainstItsGridIsAbsentOutside) {
+    SCREE_NEEDS(dem, "formats/SainteHelens.dem");
+    const TemporaryFolder folder;
+    build_store_from({dem}, folder.file("s.scree"));
+    const auto info = expect_sound_store(folder.file("s.scree"), {1, 4}, {"4M", "32M"});
+    EXPECT_EQ(info["crs"], "EPSG:26710");
+    EXPECT_EQ(info["spacing_m"], 30.0);
+    EXPECT_EQ(info["cells"], nlohmann::json({326, 465}));
+    EXPECT_LT(info["present_cells"].get<int>(), 148885);
+    EXPECT_GT(info["present_cells"].get<int>(), 147000);
+    EXPECT_EQ(info["height_range_m"], nlohmann::json({682.0, 2543.0}));
+}
+
 TEST(RealData, WhatCannotBeBuiltIsRefusedWithAMessage) {
     if (std::getenv("SCREE_DATA") == nullptr) GTEST_SKIP() << "needs the folder that $SCREE_DATA names";
     const struct {
         const char *file, *words;
     } refused[] = {{"craterlake/craterlake-imagery-30m.tif", "channels"},
                    {"rmnp/rmnp-rgb.tif", "channels"},
-                   {"formats/SainteHelens.dem", "USGS"},
                    {"formats/terrarium_fuji.png", "channels"},
                    {"world/earth-topology.png", "--spacing"},
                    {"world/earth-blue-marble.jpg", "channels"},

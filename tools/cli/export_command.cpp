@@ -101,17 +101,12 @@ const char* name_of(SampleType type) {
 std::string to_json(const RasterReport& r, double seconds) {
     using Json = nlohmann::ordered_json;
     const GeotiffLayout& l = r.layout;
-    const Json out = {{"size", {l.width, l.height}},
-                      {"type", name_of(l.type)},
-                      {"channels", l.channels},
-                      {"level", r.level},
-                      {"origin_m", {l.x, l.y}},
-                      {"step_m", {l.step_x, l.step_y}},
-                      {"nodata", l.nodata ? Json(*l.nodata) : Json()},
-                      {"absent", r.absent},
-                      {"bytes", r.bytes},
-                      {"projection_file", r.sidecar},
-                      {"seconds", seconds}};
+    Json out = {{"size", {l.width, l.height}},  {"type", name_of(l.type)},
+                {"channels", l.channels},       {"level", r.level},
+                {"origin_m", {l.x, l.y}},       {"step_m", {l.step_x, l.step_y}},
+                {"absent", r.absent},           {"bytes", r.bytes},
+                {"projection_file", r.sidecar}, {"seconds", seconds}};
+    if (l.nodata) out["nodata"] = *l.nodata;
     return out.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
@@ -156,7 +151,7 @@ int run_export(int argc, char** argv) {
     std::string path, heights, imagery, texture, out, box, size, json;
     int level = 0;
     app.add_option("STORE", path, "A .scree file")->required();
-    auto* const what = app.add_option_group("What");
+    auto* const what = app.add_option_group("What", "What to write");
     auto* const heights_option = what->add_option(
         "--heights", heights, "Heights as GeoTIFF of points: integers where all are whole metres, else floats");
     auto* const imagery_option = what->add_option("--imagery", imagery, "Texels as GeoTIFF of areas, RGBA");

@@ -18,20 +18,26 @@ constexpr std::int64_t kBlock = GeotiffWriter::kBlock;
 
 using Texel = std::array<std::uint8_t, 4>;
 
-// EXT_texture_compression_s3tc; endpoints by repeating their upper bits, thirds and halves rounded to nearest.
+// EXT_texture_compression_s3tc, every colour rounded once, to nearest.
 Texel bc1_texel(const std::uint8_t* block, unsigned x, unsigned y) {
     const unsigned c0 = block[0] | unsigned{block[1]} << 8, c1 = block[2] | unsigned{block[3]} << 8;
     const unsigned selector = block[4 + y] >> (2 * x) & 3;
-    if (c0 <= c1 && selector == 3) return {0, 0, 0, 0};
+    const bool four_colours = c0 > c1;
+    if (!four_colours && selector == 3) return {0, 0, 0, 0};
+    // Shares of the first endpoint and of both together.
+    const unsigned whole = selector < 2   ? 1
+                           : four_colours ? 3
+                                          : 2,
+                   first = selector == 0   ? 1
+                           : selector == 1 ? 0
+                                           : whole - (selector == 2 ? 1 : 2);
     const auto part = [](unsigned c, int channel) {
-        const unsigned five = (channel == 0 ? c >> 11 : c) & 31, six = c >> 5 & 63;
-        return channel == 1 ? six << 2 | six >> 4 : five << 3 | five >> 2;
+        return channel == 0 ? c >> 11 : channel == 1 ? c >> 5 & 63 : c & 31;
     };
     Texel texel{0, 0, 0, 255};
     for (int k = 0; k < 3; ++k) {
-        const unsigned a = part(c0, k), b = part(c1, k);
-        const unsigned between = c0 <= c1 ? (a + b + 1) / 2 : selector == 2 ? (2 * a + b + 1) / 3 : (a + 2 * b + 1) / 3;
-        texel[static_cast<std::size_t>(k)] = static_cast<std::uint8_t>(selector == 0 ? a : selector == 1 ? b : between);
+        const unsigned sum = first * part(c0, k) + (whole - first) * part(c1, k), full = whole * (k == 1 ? 63 : 31);
+        texel[static_cast<std::size_t>(k)] = static_cast<std::uint8_t>((2 * 255 * sum + full) / (2 * full));
     }
     return texel;
 }

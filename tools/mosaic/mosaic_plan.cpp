@@ -315,10 +315,11 @@ private:
                                            east - west, south - north, step, kMaxCellsPerSide));
         const int shift = base_shift((east - west) * (south - north), step);
         const double unit = std::ldexp(1.0, shift);
-        west = std::floor(west / unit) * unit;
-        north = std::floor(north / unit) * unit;
-        east = std::ceil(east / unit) * unit;
-        south = std::ceil(south / unit) * unit;
+        const auto [i, j] = point_of_coarse_sample(*grid, shift);
+        west = i + std::floor((west - i) / unit) * unit;
+        north = j + std::floor((north - j) / unit) * unit;
+        east = i + std::ceil((east - i) / unit) * unit;
+        south = j + std::ceil((south - j) / unit) * unit;
         auto lattice = make_lattice(grid->x_m + west * step, grid->y_m - north * step, step,
                                     static_cast<std::int64_t>(east - west), static_cast<std::int64_t>(south - north),
                                     request_.tile_cells_log2);
@@ -330,13 +331,28 @@ private:
         return {};
     }
 
-    // Halvings that are left to single branches: those that make the fewest points in all, and none of the coarsest
-    // layer's. `points`: of the finest lattice, if it were dense.
+    // Where the dense part may begin: on a sample of the first layer that is as coarse, if that is a grid point. Listed
+    // after a finer file, it would else fall between the dense part's points and lose its sharpest samples.
+    std::pair<double, double> point_of_coarse_sample(const TargetGrid& grid, int shift) const {
+        for (std::size_t k = 0; k < plan_.height_layers.size(); ++k) {
+            const Layer& layer = plan_.height_layers[k];
+            if (coarser_by(cell_sizes_[k], grid.step_m) < shift || !layer.crs.same_as(plan_.crs)) continue;
+            const double i = (layer.where.first_x - grid.x_m) / grid.step_m,
+                         j = (grid.y_m - layer.where.first_y) / grid.step_m;
+            if (std::abs(i - std::nearbyint(i)) <= kOneSample && std::abs(j - std::nearbyint(j)) <= kOneSample)
+                return {std::nearbyint(i), std::nearbyint(j)};
+        }
+        return {0, 0};
+    }
+
+    // Halvings that are left to single branches: those that make the fewest points in all. `points`: of the finest
+    // lattice, if it were dense. None beyond the coarsest layer: tint and interior voids are made by cells of the dense
+    // part.
     int base_shift(double points, double step) const {
-        int best = 0;
+        int best = 0, most = 0;
+        for (const double cell : cell_sizes_) most = std::max(most, coarser_by(cell, step));
         double least = std::numeric_limits<double>::infinity();
-        const int most = coarser_by(*std::max_element(cell_sizes_.begin(), cell_sizes_.end()), step);
-        for (int shift = 0; shift <= most; ++shift) {
+        for (int shift = 0; shift <= most && std::ldexp(points, -2 * shift) >= 1; ++shift) {
             double cost = std::ldexp(points, -2 * shift);
             for (std::size_t k = 0; k < plan_.height_layers.size(); ++k)
                 if (coarser_by(cell_sizes_[k], step) < shift) cost += kBranchCost * points_of(plan_.height_layers[k]);

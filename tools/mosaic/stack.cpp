@@ -38,6 +38,7 @@ struct LayerOnGrid {
     const SpooledLayer<T>* spooled;
     WarpMap map;
     Kernel kernel;
+    double reach = 1;  // of a step, that a point stands for
 };
 
 Error interrupted() { return {ErrorCode::interrupted, "stopped; nothing was written"}; }
@@ -109,8 +110,11 @@ public:
         else
             map_sparse(area);
         // One footprint a chunk of the map: what is asked for does not change what is given.
-        rule_ = {layer.kernel, layer.map.shrink_at(chunk_middle(area.i), chunk_middle(area.j)),
-                 layer.spooled->layer.half_sample_rim, layer.spooled->layer.columns, layer.spooled->layer.rows};
+        WarpMap::Shrink shrink = layer.map.shrink_at(chunk_middle(area.i), chunk_middle(area.j));
+        shrink.columns *= layer.reach;
+        shrink.rows *= layer.reach;
+        rule_ = {layer.kernel, shrink, layer.spooled->layer.half_sample_rim, layer.spooled->layer.columns,
+                 layer.spooled->layer.rows};
     }
 
     std::optional<Window> window() const { return window_of(points_, layer_.spooled->layer, rule_); }
@@ -330,13 +334,13 @@ Result<SpooledLayer<T>> empty_layer(Layer layer, const StackOptions& options, T 
 
 template <class T>
 Result<std::vector<LayerOnGrid<T>>> place_on(const std::vector<SpooledLayer<T>>& layers, const TargetGrid& grid,
-                                             const Crs& grid_crs, Kernel kernel) {
+                                             const Crs& grid_crs, Kernel kernel, double reach = 1) {
     std::vector<LayerOnGrid<T>> placed;
     for (const SpooledLayer<T>& l : layers) {
         auto map = WarpMap::make(grid, grid_crs, l.layer.where, l.layer.crs);
         if (!map) return map.error();
         // Points on samples take them as they are, with any kernel; nearest says so to the last bit.
-        placed.push_back({&l, std::move(*map), on_grid(l.layer, grid, grid_crs) ? Kernel::nearest : kernel});
+        placed.push_back({&l, std::move(*map), on_grid(l.layer, grid, grid_crs) ? Kernel::nearest : kernel, reach});
     }
     return placed;
 }
@@ -479,11 +483,11 @@ struct HeightGrid::Impl {
 HeightGrid::HeightGrid(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 HeightGrid::~HeightGrid() = default;
 
-Result<std::unique_ptr<HeightGrid>> HeightStack::on(const TargetGrid& grid, const Crs& grid_crs) const {
+Result<std::unique_ptr<HeightGrid>> HeightStack::on(const TargetGrid& grid, const Crs& grid_crs, double reach) const {
     auto impl = std::make_unique<HeightGrid::Impl>();
-    auto narrow = place_on(impl_->narrow, grid, grid_crs, impl_->kernel);
+    auto narrow = place_on(impl_->narrow, grid, grid_crs, impl_->kernel, reach);
     if (!narrow) return narrow.error();
-    auto wide_layers = place_on(impl_->wide, grid, grid_crs, impl_->kernel);
+    auto wide_layers = place_on(impl_->wide, grid, grid_crs, impl_->kernel, reach);
     if (!wide_layers) return wide_layers.error();
     impl->narrow = std::move(*narrow);
     impl->wide = std::move(*wide_layers);

@@ -53,8 +53,9 @@ public:
                                                      const ReadProgress& progress);
     ~HeightStack();
 
-    /// The heights on the points of a grid. The stack must outlive it.
-    Result<std::unique_ptr<HeightGrid>> on(const TargetGrid& grid, const Crs& grid_crs) const;
+    /// The heights on the points of a grid. The stack must outlive it. `reach`: the part of a step that a point stands
+    /// for, over which finer samples are averaged; less than 1 where the points are picked out of a finer grid.
+    Result<std::unique_ptr<HeightGrid>> on(const TargetGrid& grid, const Crs& grid_crs, double reach = 1) const;
 
     /// Of all values in the files, whether hidden or not; widened by cubic resampling's overshoot.
     HeightRange range() const;

@@ -94,7 +94,9 @@ TargetGrid grid_of(const Lattice& lattice) { return {lattice.origin_x_m, lattice
 
 Result<void> spool_stack(const BuildPlan& plan, const HeightStack& stack, HeightSpool& spool,
                          const std::atomic<bool>& stop) {
-    auto grid = stack.on(grid_of(plan.mosaic.base_lattice()), plan.mosaic.crs);
+    // Where finer layers deepen the pyramid these are points of the finest lattice, no means over coarse cells.
+    auto grid =
+        stack.on(grid_of(plan.mosaic.base_lattice()), plan.mosaic.crs, std::ldexp(1.0, -plan.mosaic.base_shift));
     if (!grid) return grid.error();
     RowBands<double> bands(spool.width(),
                            [&](std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,

@@ -82,15 +82,17 @@ void set_text(GTIF* keys, geokey_t key, const std::string& text) {
 
 void set_crs(GTIF* keys, const Crs& crs) {
     const auto code = epsg_code(crs.text());
-    GTIFKeySet(keys, GTModelTypeGeoKey, TYPE_SHORT, 1, crs.geographic() ? ModelTypeGeographic : ModelTypeProjected);
+    const std::string wkt = code ? std::string() : crs.esri_wkt();
+    // ESRI's way of saying a CRS without a code; GDAL looks for it where the model is user-defined.
+    const int model = crs.geographic() ? ModelTypeGeographic : wkt.empty() ? ModelTypeProjected : KvUserDefined;
+    GTIFKeySet(keys, GTModelTypeGeoKey, TYPE_SHORT, 1, model);
     GTIFKeySet(keys, crs.geographic() ? GeographicTypeGeoKey : ProjectedCSTypeGeoKey, TYPE_SHORT, 1,
                code.value_or(KvUserDefined));
     set_text(keys, GTCitationGeoKey, crs.name());
     if (code) return;
     if (!crs.geographic() && crs.metres_per_unit() == 1)
         GTIFKeySet(keys, ProjLinearUnitsGeoKey, TYPE_SHORT, 1, Linear_Meter);
-    // ESRI's way of saying it, which GDAL reads too.
-    if (const std::string wkt = crs.esri_wkt(); !wkt.empty())
+    if (!wkt.empty())
         set_text(keys, crs.geographic() ? GeogCitationGeoKey : PCSCitationGeoKey, "ESRI PE String = " + wkt);
 }
 

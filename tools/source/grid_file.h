@@ -47,7 +47,8 @@ Result<GridFile> open_raw_grid(ByteFile file, const std::string& header_path);
 Result<GridFile> open_dted(ByteFile file);
 bool looks_like_dted(std::string_view start);
 
-/// Source: USGS, "Standards for Digital Elevation Models", part 2 (1998).
+/// Source: USGS, "Standards for Digital Elevation Models", part 2 (1998), data elements of records A and B. The grid is
+/// the box of all profiles; its samples are int32 where heights are whole units, else float.
 Result<GridFile> open_usgs_dem(ByteFile file);
 bool looks_like_usgs_dem(std::string_view start);
 
