@@ -208,8 +208,7 @@ std::optional<std::vector<T>> by_gdal(const std::string& file, const std::string
 const std::map<std::string, std::string>& meant_otherwise() {
     static const std::map<std::string, std::string> files = {
         {"bug4468.tif", "colours that were multiplied by alpha are divided by it"},
-        {"byte_rle8.bmp", "a palette of greys gives its greys"},
-        {"zoo__openjpeg__nonregression__issue458.jp2", "five bits fill eight"},
+        {"zoo__image-tiff__images__seq__seq-3c-7b-contig-2e4f43c5.tiff", "seven bits fill eight"},
         // The same pictures by lines (basn...) agree.
         {"basi0g16.png", "GDAL 3.6 leaves interlaced 16-bit samples in the file's byte order"},
         {"basi4a16.png", "the same"},
@@ -239,6 +238,10 @@ TEST_F(HostileFiles, SamplesAreThoseOfGdal) {
         const auto name = std::filesystem::path(file).filename().string();
         const bool excused = meant_otherwise().contains(name);
         if (first) {
+            // What alpha or mask hides is no height, which GDAL leaves to its user.
+            for (std::size_t i = 0; i < first->size(); ++i)
+                if (ours->rgba[4 * i + 3] == 0 && std::isnan(ours->first_channel[i]))
+                    (*first)[i] = ours->first_channel[i];
             const auto same = [](double a, double b) { return a == b || (std::isnan(a) && std::isnan(b)); };
             const auto [a, b] = std::mismatch(first->begin(), first->end(), ours->first_channel.begin(), same);
             const std::lock_guard lock(mutex_);
