@@ -11,6 +11,7 @@
 
 #include "common/query/ground.h"
 #include "common/store/sqlite_store.h"
+#include "common/store/texture_codec.h"
 #include "tests/common/test_support.h"
 #include "tests/programs/reports.h"
 #include "tests/programs/sample_inputs.h"
@@ -306,6 +307,10 @@ protected:
         write_image(folder_.file("i.tif"), 1200, 1080, 3, 8, &whole, patchwork);
         build_store_from(
             {dem_, "--imagery", folder_.file("i.tif"), "--texture-size", "64", "--fill", "none", "--force"}, store_);
+        open_store();
+    }
+    void open_store() {
+        tiles_.clear();
         auto store = SqliteStore::open(store_);
         ASSERT_TRUE(store);
         opened_ = std::move(*store);
@@ -334,6 +339,18 @@ protected:
                 x % 4, y % 4);
         }
         return {};
+    }
+    // A tile above `level` that is not refined.
+    bool ends_above(int level) {
+        const Dataset& d = opened_->dataset();
+        bool ends = false;
+        (void)opened_->for_each(TileKind::texture, [&](const SqliteStore::RowView& row) {
+            const auto id = tile_from_key(d.lattice, row.key);
+            const auto tile = decode_texture_tile(row.payload, d.texture_size_log2, row.codec);
+            ends = ends || (id && tile && id->level < level && tile->child_mask == 0);
+            return !ends;
+        });
+        return ends;
     }
     void expect_texels(const Raster& raster, int level, std::int64_t column, std::int64_t row) {
         ASSERT_EQ(raster.channels, 4);
@@ -380,6 +397,17 @@ TEST_F(ExportImagery, ABoxHoldsTheTexelsThatItMeets) {
     EXPECT_EQ(raster.width, std::ceil(2001 / w) - static_cast<double>(column));
     EXPECT_EQ(raster.height, std::ceil(999 / w) - static_cast<double>(row));
     expect_texels(raster, level, column, row);
+}
+
+TEST_F(ExportImagery, ACoarserTexelStandsForSeveralWhereTexturesEnd) {
+    write_heights_i16(dem_, hills(80, 70, 5), {400000, 5300000, 40, 32633});
+    write_heights_i16(folder_.file("inset.tif"), hills(120, 100, 6), {401200, 5299200, 5, 32633});
+    build_store_from({dem_, folder_.file("inset.tif"), "--texture-size", "16", "--tile-size", "9", "--force"}, store_);
+    open_store();
+    const int level = opened_->dataset().texture_deepest_level;
+    if (!ends_above(level)) GTEST_SKIP() << "this build refines every texture to the deepest level";
+    export_to(out_, {}, "--imagery");
+    expect_texels(read_raster(out_), level, 0, 0);
 }
 
 nlohmann::json gdalinfo(const std::string& file) {
