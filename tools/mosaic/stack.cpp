@@ -224,36 +224,31 @@ Result<void> sample_chunk(const std::vector<LayerOnGrid<T>>& layers, const Recta
     return {};
 }
 
-// The points of one axis that fall into a chunk of the map.
+// Of the points begin + k * stride: those from `first` on that fall into its chunk of the map. Steps may be far longer
+// than chunks.
 struct Share {
-    std::int64_t first = 0, count = 0;  // of the points
+    std::int64_t first = 0, count = 0;
 };
-Share share_of(std::int64_t chunk, std::int64_t begin, std::int64_t count, std::int64_t stride) {
-    const auto points_before = [&](std::int64_t at) {
-        return std::clamp<std::int64_t>(at <= begin ? 0 : (at - begin + stride - 1) / stride, 0, count);
-    };
-    const std::int64_t first = points_before(chunk * WarpMap::kChunk),
-                       end = points_before((chunk + 1) * WarpMap::kChunk);
-    return {first, end - first};
+Share share_from(std::int64_t first, std::int64_t begin, std::int64_t count, std::int64_t stride) {
+    const std::int64_t at = begin + first * stride, end = (chunk_of(at) + 1) * WarpMap::kChunk;
+    return {first, std::min((end - at + stride - 1) / stride, count - first)};
 }
 
 template <class T>
 Result<void> sample_layers(const std::vector<LayerOnGrid<T>>& layers, const Rectangle& area,
                            std::span<Resampled<T>> out) {
     std::vector<Resampled<T>> values;
-    const std::int64_t last_x = chunk_of(area.i + (area.columns - 1) * area.stride),
-                       last_y = chunk_of(area.j + (area.rows - 1) * area.stride);
-    for (std::int64_t y = chunk_of(area.j); y <= last_y; ++y)
-        for (std::int64_t x = chunk_of(area.i); x <= last_x; ++x) {
-            const Share across = share_of(x, area.i, area.columns, area.stride),
-                        down = share_of(y, area.j, area.rows, area.stride);
-            if (across.count == 0 || down.count == 0) continue;
+    for (Share down; down.first < area.rows; down.first += down.count) {
+        down = share_from(down.first, area.j, area.rows, area.stride);
+        for (Share across; across.first < area.columns; across.first += across.count) {
+            across = share_from(across.first, area.i, area.columns, area.stride);
             const Rectangle part{area.i + across.first * area.stride, area.j + down.first * area.stride, across.count,
                                  down.count, area.stride};
             values.resize(static_cast<std::size_t>(part.count()));
             if (auto ok = sample_chunk<T>(layers, part, values); !ok) return ok;
             copy_part<Resampled<T>>(values, part, out, area, part);
         }
+    }
     return {};
 }
 
