@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 #include <thread>
+#include <tuple>
 
 #include "tools/pyramid/height_pyramid.h"
 #include "tools/pyramid/height_spool.h"
@@ -169,6 +170,10 @@ Result<BuildPlan> plan_build(const BuildOptions& o) {
     d.attribution = o.attribution;
     for (const PlacedFile& f : m.heights) d.sources.push_back(source_record(f.path, "heights", f.info));
     for (const PlacedFile& f : m.imagery) d.sources.push_back(source_record(f.path, "imagery", f.info));
+    // By name: the order of files that do not overlap changes nothing.
+    std::stable_sort(d.sources.begin(), d.sources.end(), [](const SourceRecord& a, const SourceRecord& b) {
+        return std::tie(a.role, a.name, a.fingerprint) < std::tie(b.role, b.name, b.fingerprint);
+    });
     d.has_imagery = !m.imagery.empty();
     const double cell_m = m.base_lattice().spacing_m, source_texel = d.has_imagery ? m.finest_pixel_m : cell_m;
     d.texture_deepest_level = texture_depth(d, cell_m, source_texel);
