@@ -131,6 +131,8 @@ int run_build(int argc, char** argv) {
                                         {"cpu_seconds", report->cpu_seconds},
                                         {"peak_rss_bytes", report->peak_rss_bytes},
                                         {"source_megapixels", report->source_megapixels},
+                                        {"filled_samples", report->filled_samples},
+                                        {"warnings", report->warnings},
                                         {"warp_error_m", report->warp_error_m},
                                         {"warp_rms_m", report->warp_rms_m},
                                         {"height_tiles", report->height_tiles},

@@ -227,7 +227,9 @@ private:
             plan_.scale = *scale;
         } else {
             auto chosen = choose_crs(&plan_.heights.front().crs, plan_.box);
-            if (!chosen) return chosen.error();
+            if (!chosen)
+                return Error{chosen.error().code,
+                             fmt::format("{}: {}", plan_.heights.front().path, chosen.error().message)};
             plan_.crs = std::move(chosen->crs);
             plan_.crs_reason = std::move(chosen->reason);
             plan_.scale = chosen->scale;
@@ -245,7 +247,7 @@ private:
         double along_columns = 0, along_rows = 0;
         double smaller() const { return std::min(along_columns, along_rows); }
     };
-    Result<CellSize> cell_size(const Layer& layer) const {
+    Result<CellSize> cell_size(const Layer& layer, const std::string& path) const {
         auto transform = CrsTransform::make(layer.crs, plan_.crs);
         if (!transform) return transform.error();
         const double c = std::floor(static_cast<double>(layer.columns - 1) / 2),
@@ -255,7 +257,8 @@ private:
         transform->apply(x, y);
         const CellSize size{std::hypot(x[1] - x[0], y[1] - y[0]), std::hypot(x[2] - x[0], y[2] - y[0])};
         if (!(size.smaller() > 0) || !std::isfinite(size.along_columns + size.along_rows))
-            return input_error(fmt::format("the middle of {} has no place in {}", "a mosaic", plan_.crs.name()));
+            return input_error(fmt::format("{}: the middle of {} x {} samples of its grid has no place in {}", path,
+                                           layer.columns, layer.rows, plan_.crs.name()));
         return size;
     }
 
@@ -279,7 +282,7 @@ private:
     Result<TargetGrid> choose_grid() {
         double finest = std::numeric_limits<double>::infinity();
         for (const Layer& layer : plan_.height_layers) {
-            auto size = cell_size(layer);
+            auto size = cell_size(layer, plan_.heights[layer.members.front().file].path);
             if (!size) return size.error();
             cell_sizes_.push_back(size->smaller());
             finest = std::min(finest, size->smaller());
@@ -409,7 +412,7 @@ private:
         plan_.image_layers = std::move(*layers);
         double finest = std::numeric_limits<double>::infinity();
         for (const Layer& layer : plan_.image_layers) {
-            auto size = cell_size(layer);
+            auto size = cell_size(layer, plan_.imagery[layer.members.front().file].path);
             if (!size) return size.error();
             finest = std::min(finest, size->smaller());
         }

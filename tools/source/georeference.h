@@ -19,8 +19,8 @@ struct Georeference {
     std::string crs;                    ///< what Crs::parse reads: "EPSG:n", WKT or a PROJ string; empty: not said
     std::string crs_name;               ///< citation text for people, may be empty
     std::string vertical_datum;         ///< "EPSG:n" of the vertical CRS/datum key when present, else empty
-    bool geographic = false;            ///< going: Crs says it
-    double linear_unit_m = 1;           ///< going: Crs says it
+    bool geographic = false;            ///< as the keys say, in words of the file; placing goes by Crs
+    double linear_unit_m = 1;           ///< the same
     double height_unit_m = 0;           ///< metres per unit of the heights where the file says so, else 0
 
     double x(double column, double row) const { return first_x + column * column_x + row * row_x; }
