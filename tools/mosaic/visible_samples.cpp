@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tools/mosaic/sample_positions.h"
+#include "tools/mosaic/sample_rectangle.h"
 
 namespace scree {
 namespace {
@@ -14,11 +15,6 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kRimTolerance = 1e-6;                      // samples, as in resample.h
 constexpr std::int64_t kMaxWindow = std::int64_t{1} << 18;  // samples of an upper layer held at a time
-
-struct Rectangle {
-    std::int64_t column = 0, row = 0, columns = 0, rows = 0;
-    std::int64_t count() const { return columns * rows; }
-};
 
 // From coordinates in a layer's CRS to its samples.
 class LayerPlace {
@@ -64,7 +60,7 @@ struct VisibleSamples::Impl {
         std::int64_t column, row;
     };
 
-    Result<void> hide(std::size_t k, std::size_t upper, const Rectangle& area, std::span<double> out,
+    Result<void> hide(std::size_t k, std::size_t upper, const SampleRectangle& area, std::span<double> out,
                       std::int64_t pitch) const {
         const auto found = positions.find({k, crs_of[upper]});
         auto window = found->second.window(area.column, area.row, area.columns, area.rows);
@@ -72,7 +68,7 @@ struct VisibleSamples::Impl {
         return hide_under(stack->layer(upper), upper, area, *window, out, pitch);
     }
 
-    Result<void> hide_under(const Layer& layer, std::size_t upper, const Rectangle& area,
+    Result<void> hide_under(const Layer& layer, std::size_t upper, const SampleRectangle& area,
                             const SamplePositions::Window& window, std::span<double> out, std::int64_t pitch) const {
         const LayerPlace place(layer);
         std::vector<Nearest> points;
@@ -92,7 +88,7 @@ struct VisibleSamples::Impl {
                 points.push_back(n);
             }
         if (points.empty()) return {};
-        const Rectangle above{west, north, east - west + 1, south - north + 1};
+        const SampleRectangle above{west, north, east - west + 1, south - north + 1};
         if (above.count() > kMaxWindow && area.count() > 1) return halves(layer, upper, area, window, out, pitch);
         std::vector<double> values(static_cast<std::size_t>(above.count()));
         if (auto ok = stack->samples(upper, above.column, above.row, above.columns, above.rows, values); !ok) return ok;
@@ -104,18 +100,9 @@ struct VisibleSamples::Impl {
     }
 
     // Where the layer above is far finer.
-    Result<void> halves(const Layer& layer, std::size_t upper, const Rectangle& area,
+    Result<void> halves(const Layer& layer, std::size_t upper, const SampleRectangle& area,
                         const SamplePositions::Window& window, std::span<double> out, std::int64_t pitch) const {
-        Rectangle first = area, second = area;
-        if (area.columns >= area.rows) {
-            first.columns = area.columns / 2;
-            second.column += first.columns;
-            second.columns -= first.columns;
-        } else {
-            first.rows = area.rows / 2;
-            second.row += first.rows;
-            second.rows -= first.rows;
-        }
+        const auto [first, second] = halves_of(area);
         if (auto ok = hide_under(layer, upper, first, window, out, pitch); !ok) return ok;
         const auto skipped = (second.row - area.row) * pitch + second.column - area.column;
         return hide_under(layer, upper, second, window, out.subspan(static_cast<std::size_t>(skipped)), pitch);
@@ -146,7 +133,7 @@ Result<void> VisibleSamples::read(std::size_t layer, std::int64_t column, std::i
     if (auto ok = impl_->stack->samples(layer, column, row, columns, rows, out); !ok) return ok;
     for (double& v : out)
         if (!std::isfinite(v)) v = kNaN;
-    const Rectangle area{column, row, columns, rows};
+    const SampleRectangle area{column, row, columns, rows};
     for (std::size_t upper = impl_->stack->layer_count(); upper-- > layer + 1;)
         if (auto ok = impl_->hide(layer, upper, area, out, columns); !ok) return ok;
     return {};

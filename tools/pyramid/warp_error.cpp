@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "tools/mosaic/sample_positions.h"
+#include "tools/mosaic/sample_rectangle.h"
 #include "tools/mosaic/visible_samples.h"
 
 namespace scree {
@@ -20,11 +21,6 @@ constexpr std::int64_t kBlock = RasterSpool<float>::kBlock;
 constexpr std::int64_t kMaxWindow = std::int64_t{1} << 18;  // lattice points held at a time by a thread
 constexpr std::size_t kBlocksAtOnce = 4096;                 // whose sums wait to be added in order
 constexpr double kOnLine = 1e-6;                            // cells: so near a line a place belongs to both sides
-
-struct Rectangle {
-    std::int64_t column = 0, row = 0, columns = 0, rows = 0;
-    std::int64_t count() const { return columns * rows; }
-};
 
 struct Sum {
     double greatest_m = 0, squares = 0;
@@ -186,7 +182,7 @@ private:
         double height_m;
     };
 
-    Result<Sum> judge(const Rectangle& area) const {
+    Result<Sum> judge(const SampleRectangle& area) const {
         auto truths = truths_in(area);
         if (!truths) return truths.error();
         Sum sum;
@@ -219,17 +215,8 @@ private:
     }
 
     // Samples far wider apart than the lattice's points.
-    Result<Sum> halves(const Rectangle& area) const {
-        Rectangle first = area, second = area;
-        if (area.columns >= area.rows) {
-            first.columns = area.columns / 2;
-            second.column += first.columns;
-            second.columns -= first.columns;
-        } else {
-            first.rows = area.rows / 2;
-            second.row += first.rows;
-            second.rows -= first.rows;
-        }
+    Result<Sum> halves(const SampleRectangle& area) const {
+        const auto [first, second] = halves_of(area);
         auto sum = judge(first);
         if (!sum) return sum;
         auto more = judge(second);
@@ -239,7 +226,7 @@ private:
     }
 
     // Samples with a height of their own that lie over the lattice.
-    Result<std::vector<Truth>> truths_in(const Rectangle& area) const {
+    Result<std::vector<Truth>> truths_in(const SampleRectangle& area) const {
         std::vector<double> values(static_cast<std::size_t>(area.count()));
         if (auto ok = samples_.read(index_, area.column, area.row, area.columns, area.rows, values); !ok)
             return ok.error();
