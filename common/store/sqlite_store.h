@@ -11,7 +11,7 @@
 
 namespace scree {
 
-/// Opens read-only. Errors: ErrorCode::input missing or unreadable, ErrorCode::store not a store, damaged, or of
+/// Opens read-only. A store whose last update was cut off is brought back first, which needs the right to write it. Errors: ErrorCode::input missing or unreadable, ErrorCode::store not a store, damaged, or of
 /// another format version (both are named).
 class SqliteStore final : public TileStore {
 public:
@@ -41,6 +41,8 @@ public:
     Result<std::string> integrity_problems() const;
     /// SHA-256 over (table, key, codec, payload) of every row in key order, hexadecimal.
     Result<std::string> digest() const;
+    /// The file under the path is no longer what was opened: updated in place, or replaced. Cheap: one stat().
+    bool has_changed() const;
 
 private:
     SqliteStore(std::string path, Dataset dataset) : path_(std::move(path)), dataset_(std::move(dataset)) {}
@@ -48,17 +50,37 @@ private:
     Dataset dataset_;
 };
 
-/// Writes a new store. Single thread. The file under `path` is complete only after finish() returned ok: the caller
-/// builds under a temporary name and renames.
+/// Writes a store. Single thread. A build goes on under a temporary name until finish() returned ok; the caller renames.
+///
+/// Crash safety: the file is at its last checkpoint() whatever happens at any write (SQLite's rollback journal, synced).
 class SqliteStoreWriter {
 public:
+    /// A new, empty file; an existing one is emptied.
     static Result<std::unique_ptr<SqliteStoreWriter>> create(const std::string& path);
+    /// A file that was cut off, brought back to its last checkpoint. Errors: ErrorCode::store where there is none to go
+    /// back to (empty file, not ours, damaged pages, another format version).
+    static Result<std::unique_ptr<SqliteStoreWriter>> resume(const std::string& path);
+    /// A finished store, to be changed in one transaction that finish() commits; readers go on meanwhile and see all
+    /// of it or nothing. Errors: those of SqliteStore::open; ErrorCode::usage when another process is changing it.
+    static Result<std::unique_ptr<SqliteStoreWriter>> amend(const std::string& path);
     ~SqliteStoreWriter();
     SqliteStoreWriter(const SqliteStoreWriter&) = delete;
     SqliteStoreWriter& operator=(const SqliteStoreWriter&) = delete;
 
+    /// Adds a row, or replaces the one of this key.
     Result<void> put(TileKind kind, std::int64_t key, int codec, std::span<const std::uint8_t> payload);
-    /// Writes the dataset row, commits, syncs the file and closes it.
+    Result<void> remove(TileKind kind, std::int64_t key);
+    /// Reads a row, committed or not. False: there is none.
+    Result<bool> read(TileKind kind, std::int64_t key, TileRow& row) const;
+    /// Keys of a table, ascending.
+    Result<void> for_each_key(TileKind kind, const std::function<void(std::int64_t key)>& visit) const;
+
+    /// Makes everything so far durable, with a text that resume() hands back.
+    Result<void> checkpoint(const std::string& state);
+    /// Of the last checkpoint; empty before the first.
+    const std::string& state() const;
+
+    /// Writes the dataset row, drops the state, commits, syncs the file and closes it.
     Result<void> finish(const Dataset& dataset);
 
 private:

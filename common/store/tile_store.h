@@ -12,7 +12,8 @@
 
 namespace scree {
 
-enum class TileKind : int { height = 0, texture = 1 };
+/// Seeds are the textures' pixels at one level, for updates (docs/resume-and-update.md); the runtime reads none.
+enum class TileKind : int { height = 0, texture = 1, seed = 3 };
 
 /// A row as stored.
 struct TileRow {
