@@ -13,6 +13,8 @@ class PartialFile {
 public:
     /// Creates it, or empties an abandoned one. Errors: ErrorCode::usage when another run holds it, ErrorCode::io.
     static Result<std::unique_ptr<PartialFile>> create(const std::string& path);
+    static Result<std::unique_ptr<PartialFile>> open_or_create(const std::string& path);
+    void keep();
     ~PartialFile();
     PartialFile(const PartialFile&) = delete;
     PartialFile& operator=(const PartialFile&) = delete;

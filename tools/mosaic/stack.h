@@ -103,7 +103,14 @@ public:
     static Result<std::unique_ptr<ImageStack>> read(const std::vector<PlacedFile>& files, std::vector<Layer> layers,
                                                     const TargetGrid& grid, const Crs& grid_crs,
                                                     const StackOptions& options, const ReadProgress& progress);
+    /// Opens nothing yet: files are decoded as points of the grid are asked for.
+    static Result<std::unique_ptr<ImageStack>> open(const std::vector<PlacedFile>& files, std::vector<Layer> layers,
+                                                    const TargetGrid& grid, const Crs& grid_crs,
+                                                    const StackOptions& options);
     ~ImageStack();
+    Result<void> prepare(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
+                         const ReadProgress& progress);
+    void release_north_of(std::int64_t j);
     Result<void> sample(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
                         std::span<std::uint32_t> out) const;
 

@@ -7,7 +7,6 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
-#include <mutex>
 #include <optional>
 
 #include "common/mesh/geometric_error.h"
@@ -74,7 +73,6 @@ public:
           m_(job.lattice.tile_cells()),
           n_(job.lattice.tile_cells_log2),
           corners_(job.lattice) {
-        result_.tiles = TileSet(lattice_, lattice_.deepest_level);
         result_.min_n = std::numeric_limits<std::int32_t>::max();
         result_.max_n = std::numeric_limits<std::int32_t>::min();
         for (int level = 0; level <= lattice_.deepest_level; ++level) {
@@ -91,8 +89,8 @@ public:
         raw_.resize(static_cast<std::size_t>(lattice_.cells_x + 1));
         row_.resize(levels_.back().samples.size() / static_cast<std::size_t>(m_ + 1));
         if (job.deep_tree != nullptr)
-            branches_.emplace(job.finest, *job.deep_tree, *job.deep_heights, *job.deep_presence,
-                              [this](TileId id, const std::vector<std::uint8_t>& payload) { return put(id, payload); });
+            branches_.emplace(job.finest, *job.deep_tree, *job.deep_heights,
+                              [this](TileId id, std::vector<std::uint8_t> payload) { return put(id, std::move(payload)); });
     }
 
     Result<HeightPyramidResult> run() {
@@ -101,6 +99,7 @@ public:
         for (std::int64_t j = 0; j <= padded; ++j)
             if (auto ok = push_row(j); !ok) return ok.error();
         if (auto ok = flush(); !ok) return ok.error();
+        result_.tile_count = tile_count_;
         return std::move(result_);
     }
 
@@ -296,7 +295,7 @@ private:
         tbb::parallel_for(std::int64_t{0}, band.columns,
                           [&](std::int64_t x) { records[static_cast<std::size_t>(x)] = make_deepest(band, x); });
         for (std::int64_t x = 0; x < band.columns; ++x) {
-            const TileRecord& record = records[static_cast<std::size_t>(x)];
+            TileRecord& record = records[static_cast<std::size_t>(x)];
             if (!record.outcome) return record.outcome;
             if (!record.exists) continue;
             if (record.branch) {
@@ -314,7 +313,7 @@ private:
                 ancestor.coarsest_error =
                     std::max(ancestor.coarsest_error, record.ancestor_error[static_cast<std::size_t>(up)]);
             }
-            if (auto ok = store(id, record.bounds, record.payload, !record.branch); !ok) return ok;
+            if (auto ok = store(id, record.bounds, std::move(record.payload), !record.branch); !ok) return ok;
         }
         return {};
     }
@@ -326,9 +325,9 @@ private:
             if (parent.child_mask != 0) records[static_cast<std::size_t>(x)] = make_coarser(band, x, parent);
         });
         for (std::int64_t x = 0; x < band.columns; ++x) {
-            const TileRecord& record = records[static_cast<std::size_t>(x)];
+            TileRecord& record = records[static_cast<std::size_t>(x)];
             if (record.exists)
-                if (auto ok = store({level, x, band.band}, record.bounds, record.payload, false); !ok) return ok;
+                if (auto ok = store({level, x, band.band}, record.bounds, std::move(record.payload), false); !ok) return ok;
         }
         return {};
     }
@@ -350,8 +349,7 @@ private:
         return record;
     }
 
-    Result<void> store(TileId id, const HeightBounds& bounds, const std::vector<std::uint8_t>& payload, bool leaf) {
-        result_.tiles.insert(id);
+    Result<void> store(TileId id, const HeightBounds& bounds, std::vector<std::uint8_t> payload, bool leaf) {
         if (leaf) result_.coarsest_leaf_level = std::min(result_.coarsest_leaf_level, id.level);
         if (id.level > 0) {
             LevelBand& band = levels_[static_cast<std::size_t>(id.level - 1)];
@@ -361,14 +359,15 @@ private:
             if (leaf && branches_) parent.leaf_mask = static_cast<std::uint8_t>(parent.leaf_mask | (1 << q));
             parent.children[static_cast<std::size_t>(q)] = bounds;
         }
-        return put(id, payload);
+        return put(id, std::move(payload));
     }
 
-    Result<void> put(TileId id, const std::vector<std::uint8_t>& payload) {
-        const std::lock_guard lock(writing_);
-        ++result_.tile_count;
+    // Any thread.
+    Result<void> put(TileId id, std::vector<std::uint8_t> payload) {
+        ++tile_count_;
+        if (job_.index != nullptr) job_.index->note(id, payload);
         return job_.writer->put(TileKind::height, *tile_key(lattice_, id), static_cast<int>(HeightCodec::plane),
-                                payload);
+                                std::move(payload));
     }
 
     const HeightPyramidJob& job_;
@@ -382,7 +381,7 @@ private:
     std::vector<std::int32_t> row_;  // current row, padded
     HeightPyramidResult result_;
     std::optional<DeepBranches> branches_;
-    std::mutex writing_;
+    std::atomic<std::int64_t> tile_count_{0};
 };
 
 }  // namespace
