@@ -14,6 +14,15 @@
 namespace scree {
 
 Result<std::unique_ptr<PartialFile>> PartialFile::create(const std::string& path) {
+    auto file = open_or_create(path);
+    if (file && ::ftruncate((*file)->fd_, 0) != 0)
+        return Error{ErrorCode::io, fmt::format("{}: {}", path, std::strerror(errno))};
+    return file;
+}
+
+void PartialFile::keep() { kept_ = true; }
+
+Result<std::unique_ptr<PartialFile>> PartialFile::open_or_create(const std::string& path) {
     for (;;) {
         const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
         if (fd < 0) return Error{ErrorCode::io, fmt::format("{}: {}", path, std::strerror(errno))};
@@ -26,7 +35,6 @@ Result<std::unique_ptr<PartialFile>> PartialFile::create(const std::string& path
         struct stat held {
         }, named{};
         if (::fstat(fd, &held) == 0 && ::stat(path.c_str(), &named) == 0 && held.st_ino == named.st_ino) {
-            if (::ftruncate(fd, 0) != 0) return Error{ErrorCode::io, fmt::format("{}: {}", path, std::strerror(errno))};
             return file;
         }
         file->kept_ = true;

@@ -529,6 +529,16 @@ Result<std::unique_ptr<ImageStack>> ImageStack::read(const std::vector<PlacedFil
     return std::unique_ptr<ImageStack>(new ImageStack(std::move(impl)));
 }
 
+Result<std::unique_ptr<ImageStack>> ImageStack::open(const std::vector<PlacedFile>& files, std::vector<Layer> layers,
+                                                     const TargetGrid& grid, const Crs& grid_crs,
+                                                     const StackOptions& options) {
+    return read(files, std::move(layers), grid, grid_crs, options, {});
+}
+Result<void> ImageStack::prepare(std::int64_t, std::int64_t, std::int64_t, std::int64_t, const ReadProgress&) {
+    return {};
+}
+void ImageStack::release_north_of(std::int64_t) {}
+
 Result<void> ImageStack::sample(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
                                 std::span<std::uint32_t> out) const {
     return sample_layers<std::uint32_t>(impl_->placed, {i, j, columns, rows, 1}, out);

@@ -53,24 +53,18 @@ public:
         if (!partial) return partial.error();
         partial_ = std::move(*partial);
         state_.identity = identity_of(plan_.dataset);
-        if (!options_.force) {
-            auto resumed = SqliteStoreWriter::resume(partial_->path());
-            if (resumed) {
-                if (auto ok = take_up(std::move(*resumed)); !ok) {
-                    partial_->keep();
-                    return ok;
-                }
-            } else if (resumed.error().code != ErrorCode::store) {
+        if (!options_.force)
+            if (auto ok = take_up(); !ok) {
                 partial_->keep();
-                return resumed.error();
+                return ok;
             }
-        }
-        if (!store_ && !complete_) {
+        if (complete_) return {};
+        if (!store_) {
             auto fresh = SqliteStoreWriter::create(partial_->path());
             if (!fresh) return fresh.error();
             store_ = std::move(*fresh);
         }
-        if (store_) writer_ = std::make_unique<TileWriter>(*store_);
+        writer_ = std::make_unique<TileWriter>(*store_);
         return {};
     }
 
@@ -87,22 +81,25 @@ public:
     }
 
 private:
-    Result<void> take_up(std::unique_ptr<SqliteStoreWriter> store) {
-        if (store->state().empty()) {
-            store.reset();
+    // What a build that was cut off left: rows and a state, a store that only lacks its name, or nothing of use.
+    Result<void> take_up() {
+        auto store = SqliteStoreWriter::resume(partial_->path());
+        if (!store && store.error().code != ErrorCode::store) return store.error();
+        if (!store || (*store)->state().empty()) {
+            store = Error{};
             auto finished = SqliteStore::open(partial_->path());
             complete_ = finished && identity_of((*finished)->dataset()) == state_.identity;
             if (complete_) state_.dataset = (*finished)->dataset();
             return {};
         }
-        auto state = BuildState::from_text(store->state());
+        auto state = BuildState::from_text((*store)->state());
         if (!state) return {};  // written by another version of the program: started anew
         if (auto difference = identity_difference(state->identity, state_.identity))
             return Error{ErrorCode::usage,
                          fmt::format("{}: was begun with {}; the command that began it goes on, --force starts anew",
                                      partial_->path(), *difference)};
         state_ = std::move(*state);
-        store_ = std::move(store);
+        store_ = std::move(*store);
         return {};
     }
 
