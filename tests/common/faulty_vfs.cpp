@@ -225,7 +225,8 @@ struct FaultyVfs::Impl {
         for (const auto& [sector, old] : file.sectors) {
             const std::int64_t start = sector * sector_bytes, end = std::min(start + sector_bytes, size);
             if (start >= size) continue;
-            const bool is_old = uniform(random, 0, 99) < percent_old, garbage = random() % 2 == 0;
+            const bool cut_off = start >= new_size;  // by truncating, which has not happened then
+            const bool is_old = uniform(random, 0, 99) < percent_old || cut_off, garbage = random() % 2 == 0;
             for (std::int64_t at = start; at < end; ++at) {
                 const auto k = static_cast<std::size_t>(at), in_sector = static_cast<std::size_t>(at - start);
                 const bool written = is_old ? in_sector < old.size() : k < now.size();

@@ -92,12 +92,25 @@ struct Progress {
     std::optional<Error> error;
 };
 
+// What follows an error would stand in the file without what came before it.
+void expect_refuses(SqliteStoreWriter& writer) {
+    TileRow row;
+    EXPECT_FALSE(writer.put(TileKind::height, 2000, 0, Bytes{1}).ok());
+    EXPECT_FALSE(writer.remove(TileKind::height, 1).ok());
+    EXPECT_FALSE(writer.read(TileKind::height, 1, row).ok());
+    EXPECT_FALSE(writer.for_each_key(TileKind::height, [](std::int64_t) {}).ok());
+    EXPECT_FALSE(writer.checkpoint("too late").ok());
+    EXPECT_FALSE(writer.finish(dataset_named("too late")).ok());
+}
+
 /// Writes the chapters from `first` on, and finishes.
 Progress tell(Result<std::unique_ptr<SqliteStoreWriter>> writer, const std::vector<Chapter>& story, std::size_t first) {
     Progress progress{first, false, std::nullopt};
     const auto stopped = [&](const Result<void>& ok) {
-        if (!ok) progress.error = ok.error();
-        return !ok;
+        if (ok) return false;
+        progress.error = ok.error();
+        expect_refuses(**writer);
+        return true;
     };
     if (!writer) {
         progress.error = writer.error();
@@ -205,7 +218,7 @@ TEST_F(StoreCrash, APowerLossAtAnyOperationLeavesTheLastCheckpoint) {
     int cuts = 0;
     for (std::int64_t k = 1;; ++k) {
         bool over = false;
-        for (int repeat = 0; repeat < 4 && !over; ++repeat) {
+        for (int repeat = 0; repeat < 4; ++repeat) {
             const std::uint64_t seed = random();
             SCOPED_TRACE(fmt::format("operation {}, disk seed {}", k, seed));
             start_afresh();
@@ -350,7 +363,7 @@ TEST_F(AmendCrash, APowerLossAtAnyOperationLeavesTheOldStoreOrTheNewOne) {
     test::Random random(test::seed());
     for (std::int64_t k = 1;; ++k) {
         bool over = false;
-        for (int repeat = 0; repeat < 6 && !over; ++repeat) {
+        for (int repeat = 0; repeat < 6; ++repeat) {
             const std::uint64_t seed = random();
             SCOPED_TRACE(fmt::format("operation {}, disk seed {}", k, seed));
             restore();
