@@ -130,46 +130,113 @@ void make_solid(std::uint32_t* pixels, std::int64_t count) {
     for (std::int64_t k = 0; k < count; ++k) pixels[k] = pixels[k] >> 24 >= kSolid ? pixels[k] | kOpaque : 0;
 }
 
-Result<void> resample(const LayerOnGrid& layer, const Area& area, const Canvas& out);
+// Memory that is used again from piece to piece.
+struct Scratch {
+    std::vector<double> column, row;
+    std::vector<std::uint32_t> pixels, fresh, below;
+};
 
-Result<void> resample_halves(const LayerOnGrid& layer, const Area& area, const Canvas& out) {
-    const auto [first, second] = halves_of(area);
-    for (const Area& part : {first, second})
-        if (auto ok = resample(layer, part, out.part(area, part)); !ok) return ok;
-    return {};
-}
+class LayerSampler {
+public:
+    LayerSampler(const LayerOnGrid& layer, Scratch& scratch) : layer_(layer), scratch_(scratch) {}
 
-// All kinds, in a chunk of the map or on a lattice.
-Result<void> resample(const LayerOnGrid& layer, const Area& area, const Canvas& out) {
-    const ResampleRule rule = layer.rule_at(area.i, area.j);
-    MappedPoints mapped(layer, area);
-    const auto window = source_window(mapped.points(), layer.layer, rule);
-    if (!window) {
-        out.clear(area);
+    Result<void> sample(const Area& area, const Canvas& out) {
+        if (layer_.lattice) return sample_lines(area, out);
+        Result<void> result;
+        for_each_chunk(area, [&](const Area& chunk) {
+            if (result) result = sample_points(chunk, out.part(area, chunk));
+        });
+        return result;
+    }
+
+private:
+    // Far more samples than points.
+    Result<void> sample_halves(const Area& area, const Canvas& out) {
+        const auto [first, second] = halves_of(area);
+        for (const Area& part : {first, second})
+            if (auto ok = sample(part, out.part(area, part)); !ok) return ok;
         return {};
     }
-    // Far more samples than points.
-    if (window->count() > kMostWindowSamples && area.count() > 1) return resample_halves(layer, area, out);
-    std::vector<std::uint32_t> pixels(static_cast<std::size_t>(window->count()));
-    if (auto read = layer.pixels->read(*window, pixels.data(), window->columns); !read) return read.error();
-    std::vector<std::uint32_t> fresh(static_cast<std::size_t>(area.count()));
-    resample_colours({window->column, window->row, window->columns, window->rows, pixels}, mapped.points(), rule,
-                     fresh);
-    for (std::int64_t r = 0; r < area.rows; ++r) {
-        std::copy_n(fresh.data() + r * area.columns, area.columns, out.row(r));
-        make_solid(out.row(r), area.columns);
-    }
-    return {};
-}
 
-Result<void> sample_layer(const LayerOnGrid& layer, const Area& area, const Canvas& out) {
-    if (layer.lattice) return resample(layer, area, out);
-    Result<void> result;
-    for_each_chunk(area, [&](const Area& chunk) {
-        if (result) result = resample(layer, chunk, out.part(area, chunk));
-    });
-    return result;
-}
+    // In a chunk of the map.
+    Result<void> sample_points(const Area& area, const Canvas& out) {
+        const ResampleRule rule = layer_.rule_at(area.i, area.j);
+        scratch_.column.resize(static_cast<std::size_t>(area.count()));
+        scratch_.row.resize(scratch_.column.size());
+        const SourcePoints points{scratch_.column, scratch_.row};
+        layer_.map.map(area.i, area.j, area.columns, area.rows, points);
+        return resample(area, source_window(points, layer_.layer, rule), out,
+                        [&](const auto& window, auto fresh) { resample_colours(window, points, rule, fresh); });
+    }
+
+    Result<void> sample_lines(const Area& area, const Canvas& out) {
+        const MappedLines lines(layer_, area);
+        if (layer_.kernel == Kernel::nearest) {
+            const auto columns = run_of(lines.column, layer_.layer.columns),
+                       rows = run_of(lines.row, layer_.layer.rows);
+            if (columns && rows) return copy(*columns, *rows, area, out);
+        }
+        const ResampleRule rule = layer_.rule_at(area.i, area.j);
+        return resample(area, window_of_lines(layer_, area), out, [&](const auto& window, auto fresh) {
+            resample_colour_lines(window, {lines.column, lines.row}, rule, fresh);
+        });
+    }
+
+    template <class Make>
+    Result<void> resample(const Area& area, const std::optional<SampleRectangle>& window, const Canvas& out,
+                          Make&& make) {
+        if (!window) {
+            out.clear(area);
+            return {};
+        }
+        if (window->count() > kMostWindowSamples && area.count() > 1) return sample_halves(area, out);
+        std::vector<std::uint32_t>& pixels = scratch_.pixels;
+        pixels.resize(static_cast<std::size_t>(window->count()));
+        const auto opaque = layer_.pixels->read(*window, pixels.data(), window->columns);
+        if (!opaque) return opaque.error();
+        std::vector<std::uint32_t>& fresh = scratch_.fresh;
+        fresh.resize(static_cast<std::size_t>(area.count()));
+        make(SampleWindow<std::uint32_t>{window->column, window->row, window->columns, window->rows, pixels},
+             std::span<std::uint32_t>(fresh));
+        for (std::int64_t r = 0; r < area.rows; ++r) {
+            std::copy_n(fresh.data() + r * area.columns, area.columns, out.row(r));
+            if (!*opaque) make_solid(out.row(r), area.columns);
+        }
+        return {};
+    }
+
+    // Points first .. first + count - 1 of a line stand on samples sample, sample + 1...; the others outside.
+    struct Run {
+        std::int64_t first = 0, sample = 0, count = 0;
+    };
+    std::optional<Run> run_of(const std::vector<double>& line, std::int64_t size) const {
+        const auto sample_of = [&](std::int64_t k) {
+            return nearest_sample(line[static_cast<std::size_t>(k)], size, layer_.layer.half_sample_rim);
+        };
+        std::int64_t first = 0, last = static_cast<std::int64_t>(line.size()) - 1;
+        while (first <= last && sample_of(first) < 0) ++first;
+        while (first <= last && sample_of(last) < 0) --last;
+        if (first > last) return Run{};
+        // Steps are even: if the last one is where it should be, so are all.
+        const std::int64_t sample = sample_of(first);
+        if (sample_of(last) - sample != last - first) return std::nullopt;
+        return Run{first, sample, last - first + 1};
+    }
+
+    Result<void> copy(const Run& columns, const Run& rows, const Area& area, const Canvas& out) const {
+        if (columns.count < area.columns || rows.count < area.rows) out.clear(area);
+        if (columns.count == 0 || rows.count == 0) return {};
+        const Canvas inside{out.row(rows.first) + columns.first, out.pitch};
+        const auto opaque =
+            layer_.pixels->read({columns.sample, rows.sample, columns.count, rows.count}, inside.pixels, inside.pitch);
+        if (!opaque) return opaque.error();
+        for (std::int64_t r = 0; r < rows.count && !*opaque; ++r) make_solid(inside.row(r), columns.count);
+        return {};
+    }
+
+    const LayerOnGrid& layer_;
+    Scratch& scratch_;
+};
 
 bool complete(const Area& area, const Canvas& out) {
     for (std::int64_t r = 0; r < area.rows; ++r)
@@ -177,23 +244,25 @@ bool complete(const Area& area, const Canvas& out) {
     return true;
 }
 
-Result<void> sample_piece(const std::vector<LayerOnGrid>& layers, const Area& area, const Canvas& out) {
+Result<void> sample_piece(const std::vector<LayerOnGrid>& layers, const Area& area, const Canvas& out,
+                          Scratch& scratch) {
     bool empty = true;
-    std::vector<std::uint32_t> below;
     for (auto layer = layers.rbegin(); layer != layers.rend(); ++layer) {
         if (layer->lattice && !window_of_lines(*layer, area)) continue;
         if (empty) {
-            if (auto ok = sample_layer(*layer, area, out); !ok) return ok;
+            if (auto ok = LayerSampler(*layer, scratch).sample(area, out); !ok) return ok;
             empty = false;
             continue;
         }
         if (complete(area, out)) break;
-        below.resize(static_cast<std::size_t>(area.count()));
-        const Canvas canvas{below.data(), area.columns};
-        if (auto ok = sample_layer(*layer, area, canvas); !ok) return ok;
-        for (std::int64_t r = 0; r < area.rows; ++r)
-            for (std::int64_t c = 0; c < area.columns; ++c)
-                if (out.row(r)[c] == 0) out.row(r)[c] = canvas.row(r)[c];
+        scratch.below.resize(static_cast<std::size_t>(area.count()));
+        const Canvas below{scratch.below.data(), area.columns};
+        if (auto ok = LayerSampler(*layer, scratch).sample(area, below); !ok) return ok;
+        for (std::int64_t r = 0; r < area.rows; ++r) {
+            std::uint32_t* over = out.row(r);
+            const std::uint32_t* under = below.row(r);
+            for (std::int64_t c = 0; c < area.columns; ++c) over[c] = over[c] == 0 ? under[c] : over[c];
+        }
     }
     if (empty) out.clear(area);
     return {};
@@ -409,11 +478,12 @@ Result<void> ImageStack::sample(std::int64_t i, std::int64_t j, std::int64_t col
                                 std::span<std::uint32_t> out) const {
     const Area area{i, j, columns, rows};
     const Canvas canvas{out.data(), columns};
+    Scratch scratch;
     for (std::int64_t top = j; top < j + rows;) {
         const std::int64_t bottom = std::min((chunk_of(top) + 1) * WarpMap::kChunk, j + rows);
         for (std::int64_t left = i; left < i + columns; left += kPieceColumns) {
             const Area piece{left, top, std::min(kPieceColumns, i + columns - left), bottom - top};
-            if (auto ok = sample_piece(impl_->layers, piece, canvas.part(area, piece)); !ok) return ok;
+            if (auto ok = sample_piece(impl_->layers, piece, canvas.part(area, piece), scratch); !ok) return ok;
         }
         top = bottom;
     }
