@@ -8,6 +8,7 @@
 #include <mutex>
 
 #include "common/store/height_codec.h"
+#include "tools/pyramid/sample_range.h"
 
 namespace scree {
 namespace {
@@ -105,9 +106,9 @@ void let_errors_grow(HeightBounds& bounds, int tile_cells_log2) {
 HeightBounds bounds_over(std::span<const HeightBounds> children, std::span<const std::int32_t> samples,
                          double coarsest_error, int tile_cells_log2) {
     HeightBounds bounds;
-    const auto [low, high] = std::minmax_element(samples.begin(), samples.end());
-    bounds.min_n = *low;
-    bounds.max_n = *high;
+    const SampleRange range = range_of(samples);
+    bounds.min_n = range.low;
+    bounds.max_n = range.high;
     for (const HeightBounds& child : children) {
         bounds.min_n = std::min(bounds.min_n, child.min_n);
         bounds.max_n = std::max(bounds.max_n, child.max_n);
@@ -205,9 +206,9 @@ Result<BranchSummary> DeepBranches::leaf(TileId id, const Place& place) const {
     presence_.note_stored(id);
     const auto vertices = present_vertices(tile.presence, n);
     const FinestVertices finest{tile.samples.data(), vertices.empty() ? nullptr : vertices.data(), n};
-    const auto [low, high] = std::minmax_element(tile.samples.begin(), tile.samples.end());
-    summary.bounds.min_n = *low;
-    summary.bounds.max_n = *high;
+    const SampleRange range = range_of(tile.samples);
+    summary.bounds.min_n = range.low;
+    summary.bounds.max_n = range.high;
     const auto errors = leaf_errors(finest);
     for (std::size_t g = 0; g < static_cast<std::size_t>(n); ++g)
         summary.bounds.error_n[g] = round_up_to_float(errors[g]);
