@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -93,10 +94,32 @@ void SuspectValues::look_at(double v) {
     for (Suspect& s : suspects_) s.has_neighbours |= std::abs(v - s.value) <= kNeighbourhood;
 }
 
-void SuspectValues::add(std::span<const double> values) {
-    for (const double v : values)
-        if (v <= ordinary_above_ || v >= ordinary_below_) look_at(v);
+// Most values matter to nobody: whole groups are passed over by their range.
+template <class T>
+void SuspectValues::add_all(std::span<const T> values) {
+    constexpr std::size_t kGroup = 1024, kLanes = 16;
+    if (suspects_.empty()) return;
+    for (std::size_t first = 0; first < values.size(); first += kGroup) {
+        const auto group = values.subspan(first, std::min(kGroup, values.size() - first));
+        std::array<T, kLanes> low, high;
+        low.fill(std::numeric_limits<T>::infinity());
+        high.fill(-std::numeric_limits<T>::infinity());
+        const std::size_t whole = group.size() / kLanes * kLanes;
+        for (std::size_t i = 0; i < whole; i += kLanes)
+            for (std::size_t k = 0; k < kLanes; ++k) {
+                const T v = group[i + k];
+                low[k] = v < low[k] ? v : low[k];
+                high[k] = v > high[k] ? v : high[k];
+            }
+        const bool ordinary = static_cast<double>(*std::min_element(low.begin(), low.end())) > ordinary_above_ &&
+                              static_cast<double>(*std::max_element(high.begin(), high.end())) < ordinary_below_;
+        for (const T v : ordinary ? group.subspan(whole) : group)
+            if (v <= ordinary_above_ || v >= ordinary_below_) look_at(v);
+    }
 }
+
+void SuspectValues::add(std::span<const double> values) { add_all(values); }
+void SuspectValues::add(std::span<const float> values) { add_all(values); }
 
 std::optional<std::string> SuspectValues::warning(const std::string& path) const {
     const Suspect* accused = nullptr;
