@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "common/mesh/leaf_error_kernel.h"
+#include "common/mesh/error_kernels.h"
 #include "common/mesh/tile_patterns.h"
 
 namespace scree {
@@ -84,6 +84,11 @@ double block_error(const BlockVertices& v, std::int64_t stride, unsigned removab
     return worst;
 }
 
+const ErrorKernels& kernels() {
+    static const ErrorKernels& best = best_error_kernels();
+    return best;
+}
+
 // --- a block over a tile that one of its quadrants holds ---
 
 // One side of the block, or both halves of its thinned side, as planes over the distances (u, v) of a vertex from the
@@ -100,6 +105,8 @@ struct QuadrantTile {
     const std::uint8_t* present;  // or nullptr
     std::int64_t step_u, step_v;  // through samples
     std::int64_t double_stride;
+
+    bool on_diagonal() const { return u0 == v0; }
 };
 
 QuadrantTile quadrant_tile(std::int64_t stride, std::int64_t x0, std::int64_t y0, const FinestVertices& finest) {
@@ -153,7 +160,7 @@ struct Distances {
 
 // At the tile's vertices a multiple of `step` cells from its corner.
 void look_at_vertices(const QuadrantTile& tile, const QuadrantPlane& plane, std::int64_t step, Distances& greatest) {
-    const bool diagonal = tile.u0 == tile.v0;
+    const bool diagonal = tile.on_diagonal();
     for (std::int64_t r = 0; r <= tile.m; r += step) {
         const std::int64_t first = diagonal && plane.where_u_leads ? r : 0;
         const std::int64_t last = diagonal && !plane.where_u_leads ? r : tile.m;
@@ -168,19 +175,38 @@ void look_at_vertices(const QuadrantTile& tile, const QuadrantPlane& plane, std:
     }
 }
 
+// The same at all of a tile's vertices, in the tile's own columns and rows.
+std::int64_t greatest_distance(const QuadrantTile& tile, const QuadrantPlane& plane, const FinestVertices& finest) {
+    const bool east = tile.step_u > 0, south = tile.step_v > 0;
+    const std::int64_t u = tile.u0 + (east ? 0 : tile.m), v = tile.v0 + (south ? 0 : tile.m);
+    TilePlane own{static_cast<double>(plane.centre + plane.along_u * u + plane.along_v * v),
+                  static_cast<double>(east ? plane.along_u : -plane.along_u),
+                  static_cast<double>(south ? plane.along_v : -plane.along_v), TilePlane::whole};
+    if (tile.on_diagonal()) {
+        if (east == south)
+            own.part = plane.where_u_leads == east ? TilePlane::north_east : TilePlane::south_west;
+        else
+            own.part = plane.where_u_leads == east ? TilePlane::south_east : TilePlane::north_west;
+    }
+    return static_cast<std::int64_t>(
+        kernels().plane_distance(finest.samples, finest.tile_cells_log2, static_cast<double>(tile.double_stride), own));
+}
+
 // --- tiles side by side ---
 
 constexpr auto kLanes = static_cast<std::size_t>(kLeafErrorTiles);
 
-// Vertex by vertex, the tiles' values side by side; lanes without a tile hold a flat one.
+// Vertex by vertex, the tiles' values side by side; lanes without a tile of their own hold the last one.
 struct SideBySide {
     std::vector<std::int32_t> samples, present;
 
     void arrange(std::span<const FinestVertices> tiles, std::size_t vertices) {
-        samples.assign(vertices * kLanes, 0);
+        samples.resize(vertices * kLanes);
         present.clear();
-        for (std::size_t lane = 0; lane < tiles.size(); ++lane)
-            for (std::size_t k = 0; k < vertices; ++k) samples[k * kLanes + lane] = tiles[lane].samples[k];
+        std::array<const std::int32_t*, kLanes> from;
+        for (std::size_t lane = 0; lane < kLanes; ++lane) from[lane] = tiles[std::min(lane, tiles.size() - 1)].samples;
+        for (std::size_t k = 0; k < vertices; ++k)
+            for (std::size_t lane = 0; lane < kLanes; ++lane) samples[k * kLanes + lane] = from[lane][k];
         if (std::none_of(tiles.begin(), tiles.end(), [](const FinestVertices& t) { return t.present != nullptr; }))
             return;
         present.assign(vertices * kLanes, -1);
@@ -233,6 +259,7 @@ double greatest_block_error(const BlockVertices& block, std::int64_t stride, std
     // Through vertices `step` apart goes the tile's surface of that stride. The block is plane over each of its
     // triangles, so between them it is no farther from the block than at them, and no sample is farther from it than
     // the tile's error there.
+    // Once that does not settle it, what looks at all vertices does so faster than they can be chosen.
     for (int log2_step = finest.tile_cells_log2 - 1;; --log2_step) {
         Distances greatest;
         for (std::size_t k = 0; k < planes.count; ++k)
@@ -241,7 +268,11 @@ double greatest_block_error(const BlockVertices& block, std::int64_t stride, std
         if (log2_step == 0) return known;
         const double beyond = own[static_cast<std::size_t>(log2_step)] * units;
         if (static_cast<double>(greatest.anywhere) + beyond <= known * units) return known;
+        if (finest.present == nullptr && finest.tile_cells_log2 >= kMinPlaneLog2) break;
     }
+    for (std::size_t k = 0; k < planes.count; ++k)
+        known = std::max(known, static_cast<double>(greatest_distance(tile, planes.all[k], finest)) / units);
+    return known;
 }
 
 LeafErrors leaf_errors(const FinestVertices& finest) {
@@ -283,7 +314,6 @@ LeafErrors leaf_errors(const FinestVertices& finest) {
 
 void leaf_errors(std::span<const FinestVertices> tiles, std::span<LeafErrors> errors) {
     assert(tiles.size() == errors.size());
-    static LeafErrorKernel* const kernel = best_leaf_error_kernel();
     thread_local SideBySide lanes;
     for (std::size_t first = 0; first < tiles.size(); first += kLanes) {
         const auto group = tiles.subspan(first, std::min(kLanes, tiles.size() - first));
@@ -295,7 +325,8 @@ void leaf_errors(std::span<const FinestVertices> tiles, std::span<LeafErrors> er
         const std::size_t pitch = (std::size_t{1} << n) + 1;
         lanes.arrange(group, pitch * pitch);
         std::array<std::int32_t, kLanes * kMaxLeafErrorLog2> worst{};
-        kernel(lanes.samples.data(), lanes.present.empty() ? nullptr : lanes.present.data(), n, worst.data());
+        kernels().leaf_errors(lanes.samples.data(), lanes.present.empty() ? nullptr : lanes.present.data(), n,
+                              worst.data());
         for (std::size_t k = 0; k < group.size(); ++k) {
             LeafErrors& of_tile = errors[first + k];
             of_tile = {};
@@ -309,9 +340,9 @@ void leaf_errors(std::span<const FinestVertices> tiles, std::span<LeafErrors> er
     }
 }
 
-LeafErrorKernel* best_leaf_error_kernel() {
-    if (__builtin_cpu_supports("avx512f")) return leaf_error_kernel_avx512;
-    return __builtin_cpu_supports("avx2") ? leaf_error_kernel_avx2 : leaf_error_kernel_sse2;
+const ErrorKernels& best_error_kernels() {
+    if (__builtin_cpu_supports("avx512f")) return kErrorKernelsAvx512;
+    return __builtin_cpu_supports("avx2") ? kErrorKernelsAvx2 : kErrorKernelsSse2;
 }
 
 float round_up_to_float(double value) {

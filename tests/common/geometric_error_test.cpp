@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "common/mesh/drawn_surface.h"
-#include "common/mesh/leaf_error_kernel.h"
+#include "common/mesh/error_kernels.h"
 #include "tests/common/test_support.h"
 
 namespace scree {
@@ -134,12 +134,16 @@ TEST(LeafErrors, OfSeveralTilesAreThoseOfEach) {
         }
 }
 
-TEST(LeafErrorKernels, GiveTheSameValues) {
+std::vector<const ErrorKernels*> error_kernels() {
+    std::vector<const ErrorKernels*> kernels{&kErrorKernelsSse2};
+    if (__builtin_cpu_supports("avx2")) kernels.push_back(&kErrorKernelsAvx2);
+    if (__builtin_cpu_supports("avx512f")) kernels.push_back(&kErrorKernelsAvx512);
+    return kernels;
+}
+
+TEST(ErrorKernels, GiveTheSameLeafErrors) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());
-    std::vector<LeafErrorKernel*> kernels{leaf_error_kernel_sse2};
-    if (__builtin_cpu_supports("avx2")) kernels.push_back(leaf_error_kernel_avx2);
-    if (__builtin_cpu_supports("avx512f")) kernels.push_back(leaf_error_kernel_avx512);
     constexpr auto kTiles = static_cast<std::size_t>(kLeafErrorTiles);
     for (int n = 1; n <= kMaxLeafErrorLog2; ++n)
         for (int k = 0; k < 8; ++k) {
@@ -149,17 +153,47 @@ TEST(LeafErrorKernels, GiveTheSameValues) {
                           : (test::uniform(random, 0, 1) != 0 ? kMaxHeightUnits : -kMaxHeightUnits);
             for (auto& p : present) p = -test::uniform(random, 0, 1);
             const std::size_t count = static_cast<std::size_t>(n) * kTiles;
-            std::vector<std::int32_t> plain(count), worst(count);
+            std::vector<std::int32_t> first(count), worst(count);
             for (const bool masked : {false, true}) {
                 const std::int32_t* mask = masked ? present.data() : nullptr;
-                kernels.front()(samples.data(), mask, n, plain.data());
-                for (LeafErrorKernel* kernel : kernels) {
+                kErrorKernelsSse2.leaf_errors(samples.data(), mask, n, first.data());
+                for (const ErrorKernels* kernels : error_kernels()) {
                     std::fill(worst.begin(), worst.end(), -1);
-                    kernel(samples.data(), mask, n, worst.data());
-                    ASSERT_EQ(worst, plain) << "n " << n << " case " << k << " masked " << masked;
+                    kernels->leaf_errors(samples.data(), mask, n, worst.data());
+                    ASSERT_EQ(worst, first) << "n " << n << " case " << k << " masked " << masked;
                 }
             }
         }
+}
+
+TEST(ErrorKernels, GiveThePlainDistanceFromAPlane) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    for (int k = 0; k < 3000; ++k) {
+        const int n = test::uniform(random, kMinPlaneLog2, 6), m = 1 << n;
+        const Samples samples = extreme_samples(random, n, test::uniform(random, 0, 2));
+        const std::int64_t scale = std::int64_t{2} << test::uniform(random, 0, 28);
+        const auto value = [&] { return scale * test::uniform(random, -kMaxHeightUnits, kMaxHeightUnits) / (2 * m); };
+        const std::int64_t corner = value(), per_column = value() / m, per_row = value() / m;
+        const auto part = static_cast<TilePlane::Part>(test::uniform(random, 0, 4));
+        const auto inside = [&](int i, int j) {
+            return part == TilePlane::whole || (part == TilePlane::south_west && i <= j) ||
+                   (part == TilePlane::north_east && i >= j) || (part == TilePlane::north_west && i + j <= m) ||
+                   (part == TilePlane::south_east && i + j >= m);
+        };
+        std::int64_t greatest = 0;
+        for (int j = 0; j <= m; ++j)
+            for (int i = 0; i <= m; ++i)
+                if (inside(i, j))
+                    greatest = std::max(
+                        greatest, std::abs(scale * samples[at(n, i, j)] - (corner + i * per_column + j * per_row)));
+        const TilePlane plane{static_cast<double>(corner), static_cast<double>(per_column),
+                              static_cast<double>(per_row), part};
+        for (const ErrorKernels* kernels : error_kernels())
+            ASSERT_EQ(kernels->plane_distance(samples.data(), n, static_cast<double>(scale), plane),
+                      static_cast<double>(greatest))
+                << "n " << n << " part " << part << " scale " << scale;
+    }
 }
 
 // Of a block's cells it takes those on its axes, on its diagonals, next to them, and any.

@@ -1,5 +1,8 @@
-// The vector kernel of leaf_errors. Included inside the anonymous namespace of leaf_error_kernel_<instruction set>.cpp,
-// which defines the vector of integers and its operations: no #pragma once, no includes.
+// The vector kernels of geometric errors. Included inside the anonymous namespace of
+// error_kernels_<instruction set>.cpp, which defines vectors of integers and of doubles and their operations: no
+// #pragma once, no includes.
+
+// --- leaf errors ---
 //
 // A block of 2 x 2 cells of stride s is a fan round its centre c. On one of its four sides, with the side's mid-vertex
 // m, the vertex a steps out and b steps along from the centre (b <= a <= s) lies under the surface
@@ -114,7 +117,7 @@ void errors_of(const Tiles& tiles, int n, int32_t* worst) {
     }
 }
 
-inline void run_kernel(const int32_t* samples, const int32_t* present, int n, int32_t* worst) {
+void leaf_errors_of(const int32_t* samples, const int32_t* present, int n, int32_t* worst) {
     for (int lane = 0; lane < kLeafErrorTiles; lane += kLanes) {
         const Tiles tiles{samples + lane, present == nullptr ? nullptr : present + lane, (1 << n) + 1};
         if (present == nullptr) {
@@ -123,4 +126,55 @@ inline void run_kernel(const int32_t* samples, const int32_t* present, int n, in
             errors_of<true>(tiles, n, worst + lane);
         }
     }
+}
+
+// --- distance from a plane ---
+
+struct Span {
+    int first, last;  // columns
+};
+inline Span part_of_row(TilePlane::Part part, int r, int m) {
+    switch (part) {
+        case TilePlane::south_west:
+            return {0, r};
+        case TilePlane::north_east:
+            return {r, m};
+        case TilePlane::north_west:
+            return {0, m - r};
+        case TilePlane::south_east:
+            return {m - r, m};
+        case TilePlane::whole:
+            break;
+    }
+    return {0, m};
+}
+
+double distance_from_plane(const int32_t* samples, int n, double scale, const TilePlane& plane) {
+    const int m = 1 << n;
+    const Doubles scales = splat(scale), slope = splat(plane.per_column), steps = counting();
+    Doubles high = splat(0.0), low = high;
+    for (int r = 0; r <= m; ++r) {
+        const int32_t* row = samples + r * (m + 1);
+        const Doubles start = splat(plane.at_corner + r * plane.per_row);
+        const Span part = part_of_row(plane.part, r, m);
+        for (int k = part.first / kDoubles * kDoubles; k <= part.last; k += kDoubles) {
+            const int from = k + kDoubles <= m + 1 ? k : m + 1 - kDoubles;  // the last ones overlap
+            const Doubles column = add(splat(static_cast<double>(from)), steps);
+            Doubles difference =
+                subtract(multiply(scales, to_doubles(row + from)), add(start, multiply(slope, column)));
+            if (plane.part != TilePlane::whole) {
+                difference = zero_outside(difference, column, splat(static_cast<double>(part.first)),
+                                          splat(static_cast<double>(part.last)));
+            }
+            high = maximum(high, difference);
+            low = minimum(low, difference);
+        }
+    }
+    double greatest[kDoubles];
+    store(greatest, maximum(high, subtract(splat(0.0), low)));
+    double result = 0;
+    for (const double d : greatest) {
+        result = d > result ? d : result;
+    }
+    return result;
 }
