@@ -1,9 +1,9 @@
 #include "tools/pyramid/height_quantizer.h"
 
+#include <emmintrin.h>
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "common/height_tile.h"
@@ -23,74 +23,68 @@ bool fits(const HeightQuantizer& q, double low_m, double high_m) {
 // nearbyint does.
 constexpr double kRounder = 6755399441055744.0;  // 1.5 * 2^52
 
-// The same steps as HeightQuantizer::quantize and error_m, as loops that the compiler turns into vectors. The clamp
-// comes first: its ends are integers, so that makes no difference.
-template <class T>
-class BlockQuantizer {
+// The same steps as HeightQuantizer::quantize and error_m, two values at a time. The clamp comes first: its ends are
+// integers, so that makes no difference.
+class PairQuantizer {
 public:
-    static constexpr std::size_t kBlock = 512;
-
-    explicit BlockQuantizer(const HeightQuantizer& q) : q_(q) {
+    explicit PairQuantizer(const HeightQuantizer& q)
+        : scale_(_mm_set1_pd(q.scale)),
+          offset_(_mm_set1_pd(q.offset_m)),
+          height_offset_(_mm_set1_pd(q.height_offset_m)),
+          quantum_(_mm_set1_pd(q.quantum_m)),
+          inverse_(_mm_set1_pd(1 / q.quantum_m)) {
         int exponent = 0;
         // Powers of two, whose inverse is exact.
         exact_inverse_ = std::frexp(q.quantum_m, &exponent) == 0.5 && std::abs(exponent) < 1000;
     }
 
-    void run(const T* raw, const std::uint8_t* valid, std::size_t count, std::int32_t* out, QuantizedRange& range) {
-        const HeightQuantizer q = q_;
-        for (std::size_t i = 0; i < count; ++i) metres_[i] = static_cast<double>(raw[i]) * q.scale + q.offset_m;
-        if (exact_inverse_) {
-            const double inverse = 1 / q.quantum_m;
-            for (std::size_t i = 0; i < count; ++i) units_[i] = (metres_[i] - q.height_offset_m) * inverse;
-        } else {
-            for (std::size_t i = 0; i < count; ++i) units_[i] = (metres_[i] - q.height_offset_m) / q.quantum_m;
-        }
-        constexpr double kMost = kMaxHeightUnits;
-        for (std::size_t i = 0; i < count; ++i) {
-            double n = units_[i];
-            n = n < -kMost ? -kMost : n;
-            n = n > kMost ? kMost : n;
-            units_[i] = n + kRounder - kRounder;
-        }
-        for (std::size_t i = 0; i < count; ++i) out[i] = static_cast<std::int32_t>(units_[i]);
-        for (std::size_t i = 0; i < count; ++i)
-            metres_[i] = std::abs(metres_[i] - (q.height_offset_m + units_[i] * q.quantum_m));
-        note(out, valid, count, range);
+    void add(__m128d raw, std::int32_t* out) {
+        const __m128d metres = _mm_add_pd(_mm_mul_pd(raw, scale_), offset_);
+        const __m128d above = _mm_sub_pd(metres, height_offset_);
+        __m128d n = exact_inverse_ ? _mm_mul_pd(above, inverse_) : _mm_div_pd(above, quantum_);
+        n = _mm_min_pd(_mm_max_pd(n, _mm_set1_pd(-kMaxHeightUnits)), _mm_set1_pd(kMaxHeightUnits));
+        n = _mm_sub_pd(_mm_add_pd(n, _mm_set1_pd(kRounder)), _mm_set1_pd(kRounder));
+        low_ = _mm_min_pd(low_, n);
+        high_ = _mm_max_pd(high_, n);
+        const __m128d error = _mm_sub_pd(metres, _mm_add_pd(height_offset_, _mm_mul_pd(n, quantum_)));
+        worst_ = _mm_max_pd(worst_, _mm_andnot_pd(_mm_set1_pd(-0.0), error));
+        _mm_storel_epi64(reinterpret_cast<__m128i*>(out), _mm_cvttpd_epi32(n));
+    }
+
+    QuantizedRange range() const {
+        return {static_cast<std::int32_t>(lesser(low_)), static_cast<std::int32_t>(greater(high_)), greater(worst_)};
     }
 
 private:
-    void note(const std::int32_t* n, const std::uint8_t* valid, std::size_t count, QuantizedRange& range) {
-        if (valid != nullptr) {
-            for (std::size_t i = 0; i < count; ++i)
-                if (valid[i] != 0) range.include({n[i], n[i], metres_[i]});
-            return;
-        }
-        std::int32_t low = range.min_n, high = range.max_n;
-        for (std::size_t i = 0; i < count; ++i) {
-            low = std::min(low, n[i]);
-            high = std::max(high, n[i]);
-        }
-        std::array<double, 8> worst{};
-        std::fill(metres_.begin() + static_cast<std::ptrdiff_t>(count), metres_.end(), 0.0);
-        for (std::size_t i = 0; i < kBlock; i += worst.size())
-            for (std::size_t k = 0; k < worst.size(); ++k)
-                worst[k] = metres_[i + k] > worst[k] ? metres_[i + k] : worst[k];
-        range.include({low, high, *std::max_element(worst.begin(), worst.end())});
-    }
+    static double lesser(__m128d a) { return std::min(_mm_cvtsd_f64(a), _mm_cvtsd_f64(_mm_unpackhi_pd(a, a))); }
+    static double greater(__m128d a) { return std::max(_mm_cvtsd_f64(a), _mm_cvtsd_f64(_mm_unpackhi_pd(a, a))); }
 
-    const HeightQuantizer& q_;
+    __m128d scale_, offset_, height_offset_, quantum_, inverse_;
     bool exact_inverse_ = false;
-    std::array<double, kBlock> metres_, units_;
+    __m128d low_ = _mm_set1_pd(kMaxHeightUnits), high_ = _mm_set1_pd(-kMaxHeightUnits), worst_ = _mm_setzero_pd();
 };
+
+__m128d load_pair(const double* from) { return _mm_loadu_pd(from); }
+__m128d load_pair(const float* from) {
+    return _mm_cvtps_pd(_mm_castsi128_ps(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(from))));
+}
 
 template <class T>
 QuantizedRange quantize_all(const HeightQuantizer& q, std::span<const T> raw, std::span<const std::uint8_t> valid,
                             std::span<std::int32_t> out) {
-    BlockQuantizer<T> block(q);
+    PairQuantizer pairs(q);
+    const std::size_t whole = raw.size() / 2 * 2;
+    for (std::size_t i = 0; i < whole; i += 2) pairs.add(load_pair(raw.data() + i), out.data() + i);
     QuantizedRange range;
-    for (std::size_t i = 0; i < raw.size(); i += BlockQuantizer<T>::kBlock)
-        block.run(raw.data() + i, valid.empty() ? nullptr : valid.data() + i,
-                  std::min(BlockQuantizer<T>::kBlock, raw.size() - i), out.data() + i, range);
+    if (valid.empty() && whole > 0) range = pairs.range();
+    const auto include = [&](std::size_t i) {
+        const auto value = static_cast<double>(raw[i]);
+        range.include({out[i], out[i], q.error_m(value)});
+    };
+    if (whole < raw.size()) out[whole] = q.quantize(static_cast<double>(raw[whole]));
+    if (valid.empty() && whole < raw.size()) include(whole);
+    for (std::size_t i = 0; i < valid.size(); ++i)
+        if (valid[i] != 0) include(i);
     return range;
 }
 

@@ -5,7 +5,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cassert>
 #include <cerrno>
 #include <cmath>
@@ -13,6 +12,8 @@
 #include <cstring>
 #include <limits>
 #include <type_traits>
+
+#include "tools/source/value_range.h"
 
 namespace scree {
 namespace {
@@ -85,36 +86,6 @@ Scratch& scratch() {
 
 // --- rows ---
 
-// Sixteen values at a time, so that the compiler can keep them in vectors. What compares false, NaN, changes nothing.
-template <class T>
-struct RowRange {
-    static constexpr std::size_t kLanes = 16;
-    std::array<T, kLanes> low, high;
-    std::size_t finite = 0;
-
-    RowRange() {
-        low.fill(std::numeric_limits<T>::infinity());
-        high.fill(-std::numeric_limits<T>::infinity());
-    }
-    void add(std::span<const T> row) {
-        constexpr T kGreatest = std::numeric_limits<T>::max();
-        const std::size_t whole = row.size() / kLanes * kLanes;
-        for (std::size_t i = 0; i < whole; i += kLanes)
-            for (std::size_t k = 0; k < kLanes; ++k) {
-                const T v = row[i + k];
-                low[k] = v < low[k] ? v : low[k];
-                high[k] = v > high[k] ? v : high[k];
-            }
-        for (std::size_t i = whole; i < row.size(); ++i) {
-            low[0] = row[i] < low[0] ? row[i] : low[0];
-            high[0] = row[i] > high[0] ? row[i] : high[0];
-        }
-        for (const T v : row) finite += v >= -kGreatest && v <= kGreatest ? 1 : 0;
-    }
-    T lowest() const { return *std::min_element(low.begin(), low.end()); }
-    T highest() const { return *std::max_element(high.begin(), high.end()); }
-};
-
 template <class T>
 void mark_valid(std::span<const T> row, std::span<std::uint8_t> valid) {
     constexpr T kGreatest = std::numeric_limits<T>::max();
@@ -177,29 +148,29 @@ Result<std::unique_ptr<HeightSpool>> HeightSpool::create(const std::string& path
 
 template <class T>
 void HeightSpool::note_row(std::span<const T> row) {
-    RowRange<T> range;
-    range.add(row);
-    const auto j = static_cast<std::int64_t>(rows_.size());
-    auto low = static_cast<double>(range.lowest()), high = static_cast<double>(range.highest());
-    if (range.finite < row.size() && range.finite > 0) {
-        low = INFINITY;
-        high = -INFINITY;
+    ValueRange<T> range = range_of_values(row);
+    std::size_t finite = row.size();
+    if (!range.all_finite) {
+        range = {};
+        finite = 0;
         for (const T v : row) {
             if (!std::isfinite(v)) continue;
-            low = std::min(low, static_cast<double>(v));
-            high = std::max(high, static_cast<double>(v));
+            ++finite;
+            range.low = std::min(range.low, v);
+            range.high = std::max(range.high, v);
         }
     }
-    if (range.finite > 0) {
+    if (finite > 0) {
+        const auto low = static_cast<double>(range.low), high = static_cast<double>(range.high);
         summary_.min_raw = summary_.valid_samples == 0 ? low : std::min(summary_.min_raw, low);
         summary_.max_raw = summary_.valid_samples == 0 ? high : std::max(summary_.max_raw, high);
-        summary_.valid_samples += static_cast<std::int64_t>(range.finite);
-        if (first_supporting_ < 0) first_supporting_ = j;
-        last_supporting_ = j;
+        summary_.valid_samples += static_cast<std::int64_t>(finite);
+        last_supporting_ = static_cast<std::int64_t>(rows_.size());
+        if (first_supporting_ < 0) first_supporting_ = last_supporting_;
     }
-    rows_.push_back(range.finite == row.size() ? RowState::all_valid
-                    : range.finite > 0         ? RowState::some_valid
-                                               : RowState::none_valid);
+    rows_.push_back(finite == row.size() ? RowState::all_valid
+                    : finite > 0         ? RowState::some_valid
+                                         : RowState::none_valid);
     supporting_above_.push_back(last_supporting_);
 }
 

@@ -3,9 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
+
+#include "tools/source/value_range.h"
 
 namespace scree {
 namespace {
@@ -97,23 +98,13 @@ void SuspectValues::look_at(double v) {
 // Most values matter to nobody: whole groups are passed over by their range.
 template <class T>
 void SuspectValues::add_all(std::span<const T> values) {
-    constexpr std::size_t kGroup = 1024, kLanes = 16;
+    constexpr std::size_t kGroup = 1024;
     if (suspects_.empty()) return;
     for (std::size_t first = 0; first < values.size(); first += kGroup) {
         const auto group = values.subspan(first, std::min(kGroup, values.size() - first));
-        std::array<T, kLanes> low, high;
-        low.fill(std::numeric_limits<T>::infinity());
-        high.fill(-std::numeric_limits<T>::infinity());
-        const std::size_t whole = group.size() / kLanes * kLanes;
-        for (std::size_t i = 0; i < whole; i += kLanes)
-            for (std::size_t k = 0; k < kLanes; ++k) {
-                const T v = group[i + k];
-                low[k] = v < low[k] ? v : low[k];
-                high[k] = v > high[k] ? v : high[k];
-            }
-        const bool ordinary = static_cast<double>(*std::min_element(low.begin(), low.end())) > ordinary_above_ &&
-                              static_cast<double>(*std::max_element(high.begin(), high.end())) < ordinary_below_;
-        for (const T v : ordinary ? group.subspan(whole) : group)
+        const ValueRange<T> range = range_of_values(group);
+        if (range.low > ordinary_above_ && range.high < ordinary_below_) continue;
+        for (const T v : group)
             if (v <= ordinary_above_ || v >= ordinary_below_) look_at(v);
     }
 }
