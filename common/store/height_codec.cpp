@@ -62,6 +62,17 @@ std::uint32_t predict(std::span<const std::int32_t> samples, std::size_t pitch, 
     return all;
 }
 
+// Bytes of the values, the lowest of all first.
+void split(std::span<const std::uint32_t> values, std::size_t planes, std::span<std::uint8_t> bytes) {
+    const std::size_t count = values.size();
+    const std::uint32_t* from = values.data();
+    for (std::size_t plane = 0; plane < planes; ++plane) {
+        std::uint8_t* to = bytes.data() + plane * count;
+        const auto shift = static_cast<unsigned>(8 * plane);
+        for (std::size_t k = 0; k < count; ++k) to[k] = static_cast<std::uint8_t>(from[k] >> shift);
+    }
+}
+
 struct ZstdContexts {
     std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)> compress{ZSTD_createCCtx(), ZSTD_freeCCtx};
     std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> decompress{ZSTD_createDCtx(), ZSTD_freeDCtx};
@@ -147,10 +158,7 @@ std::vector<std::uint8_t> encode_height_tile(const HeightTile& tile, int n, Heig
     const std::uint32_t all = predict(tile.samples, static_cast<std::size_t>(pitch), residuals);
     const int planes = std::max(1, (static_cast<int>(std::bit_width(all)) + 7) / 8);
     plain.resize(count * static_cast<std::size_t>(planes));
-    for (int plane = 0; plane < planes; ++plane) {
-        std::uint8_t* to = plain.data() + count * static_cast<std::size_t>(plane);
-        for (std::size_t k = 0; k < count; ++k) to[k] = static_cast<std::uint8_t>(residuals[k] >> (8 * plane));
-    }
+    split(residuals, static_cast<std::size_t>(planes), plain);
     append_presence(plain, tile.presence);
 
     packed.resize(ZSTD_compressBound(plain.size()));

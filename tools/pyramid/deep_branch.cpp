@@ -222,15 +222,15 @@ Result<BranchSummary> DeepBranches::leaf(TileId id, const Place& place) const {
         }
     for (std::size_t level = 0; level < place.base_blocks->size(); ++level) {
         const AncestorBlock& b = (*place.base_blocks)[level];
-        summary.ancestor_error[level] = coarse_block_error(b.vertices, b.stride << up, (b.offset_i << up) + in_base_i,
-                                                           (b.offset_j << up) + in_base_j, finest);
+        summary.ancestor_error[level] = greatest_block_error(b.vertices, b.stride << up, (b.offset_i << up) + in_base_i,
+                                                             (b.offset_j << up) + in_base_j, finest, errors, 0);
     }
     for (std::size_t k = 0; k < place.deep_blocks.size(); ++k) {
         const int level = place.base.level + 1 + static_cast<int>(k), down = id.level - level;
         const TileId above = ancestor_at(id, level);
         summary.ancestor_error[static_cast<std::size_t>(level)] =
-            coarse_block_error(place.deep_blocks[k], (m / 2) << down, (id.x - (above.x << down)) * m,
-                               (id.y - (above.y << down)) * m, finest);
+            greatest_block_error(place.deep_blocks[k], (m / 2) << down, (id.x - (above.x << down)) * m,
+                                 (id.y - (above.y << down)) * m, finest, errors, 0);
     }
     tile.header.own = summary.bounds;
     if (auto ok = sink_(id, encode_height_tile(tile, n, HeightCodec::plane)); !ok) return ok.error();
