@@ -12,13 +12,12 @@
 #include "tools/pyramid/height_pyramid.h"
 #include "tools/pyramid/height_spool.h"
 #include "tools/pyramid/row_bands.h"
+#include "tools/pyramid/spool_rows.h"
 #include "tools/pyramid/warp_error.h"
 #include "tools/source/suspect_values.h"
 
 namespace scree {
 namespace {
-
-constexpr std::int64_t kSpoolBandRows = 16;
 
 Error interrupted() { return {ErrorCode::interrupted, "stopped"}; }
 
@@ -33,20 +32,12 @@ Result<void> spool_in_place(const BuildPlan& plan, const BuildOptions& options, 
                      fmt::format("{}: has changed while it was read", plan.mosaic.heights.front().path)};
     const VoidRule voids(info, options);
     SuspectValues suspects(info, options);
-    std::vector<double> band(static_cast<std::size_t>(kSpoolBandRows * info.width));
-    for (std::int64_t j = 0; j < info.height; j += kSpoolBandRows) {
-        if (stop) return interrupted();
-        const std::int64_t rows = std::min(kSpoolBandRows, info.height - j);
-        const auto count = static_cast<std::size_t>(rows * info.width);
-        if (auto ok = (*dem)->read_channel(j, j + rows, std::span<double>(band.data(), count)); !ok) return ok;
-        for (std::int64_t r = 0; r < rows; ++r) {
-            const std::span<double> row(band.data() + r * info.width, static_cast<std::size_t>(info.width));
-            suspects.add(row);
-            voids.apply(row);
-            if (auto ok = spool.append(row); !ok) return ok;
-        }
+    const auto on_rows = [&](std::int64_t rows) {
         progress.add(static_cast<double>(rows * info.width) / 1e6);
-    }
+        return !stop.load();
+    };
+    if (auto ok = spool_rows(**dem, voids, suspects, spool, on_rows); !ok)
+        return ok.error().code == ErrorCode::interrupted ? interrupted() : ok.error();
     if (auto warning = suspects.warning(plan.mosaic.heights.front().path)) warnings.push_back(std::move(*warning));
     return {};
 }
