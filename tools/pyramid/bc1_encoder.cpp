@@ -326,8 +326,10 @@ void encode_bc1_row_with(Bc1Kernel* kernel, const std::uint8_t* rgba, std::size_
     std::memcpy(out + whole * kBlockBytes, blocks, rest * kBlockBytes);
 }
 
+bool bc1_kernel_avx512_runs_here() { return __builtin_cpu_supports("avx512bw") != 0; }
+
 Bc1Kernel* best_bc1_kernel() {
-    if (__builtin_cpu_supports("avx512bw")) {
+    if (bc1_kernel_avx512_runs_here()) {
         return bc1_kernel_avx512;
     }
     return __builtin_cpu_supports("avx2") ? bc1_kernel_avx2 : bc1_kernel_sse2;

@@ -21,6 +21,8 @@ Bc1Kernel bc1_kernel_sse2;
 Bc1Kernel bc1_kernel_avx2;
 Bc1Kernel bc1_kernel_avx512;  // AVX-512 F and BW
 
+bool bc1_kernel_avx512_runs_here();
+
 /// The fastest kernel that this processor runs.
 Bc1Kernel* best_bc1_kernel();
 
