@@ -60,7 +60,7 @@ void stb_high_quality(std::uint8_t* out, const std::uint8_t* pixels) {
     stb_compress_dxt_block(out, pixels, 0, STB_DXT_HIGHQUAL);
 }
 void squish_cluster(std::uint8_t* out, const std::uint8_t* pixels) {
-    squish::Compress(pixels, out, squish::kDxt1 | squish::kColourClusterFit | squish::kColourMetricUniform);
+    squish::Compress(pixels, out, squish::kDxt1 | squish::kColourClusterFit);
 }
 
 template <scree::Bc1Kernel* kKernel>
