@@ -53,8 +53,8 @@ bool north_up(const Georeference& where) { return where.axis_aligned() && where.
 // Files that are read straight through, row by row, need no copy.
 void choose_ways(const BuildOptions& o, BuildPlan& plan) {
     const MosaicPlan& m = plan.mosaic;
-    plan.heights_in_place =
-        m.base_shift == 0 && m.heights.size() == 1 && m.heights_copied && north_up(m.heights.front().where);
+    plan.heights_in_place = m.base_shift == 0 && m.heights.size() == 1 && m.heights_copied && m.same_units &&
+                            north_up(m.heights.front().where);
     plan.imagery_in_place = m.imagery.size() == 1 && m.imagery.front().crs.same_as(m.crs) &&
                             north_up(m.imagery.front().where) && o.kernel == Kernel::bilinear;
     plan.integer_heights =
