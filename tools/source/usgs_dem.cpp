@@ -10,6 +10,7 @@
 
 #include "tools/source/grid_file.h"
 #include "tools/source/number_text.h"
+#include "tools/source/text_reader.h"
 
 namespace scree {
 namespace {
@@ -22,8 +23,7 @@ constexpr std::size_t kFloatBytes = 12;
 constexpr std::size_t kHeadBytes = 3 * kIntegerBytes + 5 * kDoubleBytes;  // of a profile, after its row number
 constexpr std::int64_t kFirstBlockValues = 146;                           // that fit a record after the head
 constexpr std::int64_t kBlockValues = 170;
-constexpr std::size_t kBufferBytes = std::size_t{1} << 18;
-constexpr std::size_t kMaxRunBytes = kBufferBytes / 4;
+constexpr std::size_t kMaxRunBytes = TextReader::kBufferBytes / 4;
 constexpr std::int64_t kMaxSamples = std::int64_t{1} << 26;  // 40 times those of a 10 m quad
 constexpr std::int64_t kMaxColumnStep = 16;  // some missing profiles are a hole, more are a damaged coordinate
 constexpr double kGridTolerance = 0.1;       // of a step that profiles may start beside the grid
@@ -31,9 +31,6 @@ constexpr double kMaxHeightStep = 1e6;       // so that 999999 of them fit a flo
 constexpr double kMaxLocalDatum = 1e9;
 constexpr std::int32_t kVoid = -32767;
 constexpr std::int32_t kOtherVoid = -32766;
-
-bool is_space(char c) { return c == ' ' || (c >= '\t' && c <= '\r') || c == '\0' || c == '\x1A'; }
-bool is_line_end(char c) { return c == '\n' || c == '\r'; }
 
 Error broken(std::string reason) { return {ErrorCode::input, std::move(reason)}; }
 
@@ -56,39 +53,25 @@ std::optional<double> number_at(std::string_view text, std::size_t at, std::size
     return fortran_number(text.substr(at, bytes));
 }
 
-// Fields of the file from some offset on, through one buffer. Errors hold the bare reason.
+// Fields of the file from some offset on. Errors hold the bare reason.
 class FieldReader {
 public:
-    explicit FieldReader(const ByteFile& file) : file_(&file), buffer_(kBufferBytes) {}
+    explicit FieldReader(const ByteFile& file) : text_(file, kMaxRunBytes) {}
 
     void seek(std::int64_t offset) {
         run_left_ = 0;
-        const std::int64_t buffered = next_ - static_cast<std::int64_t>(end_);
-        if (offset >= buffered && offset <= next_) {
-            at_ = static_cast<std::size_t>(offset - buffered);
-            return;
-        }
-        at_ = end_ = 0;
-        next_ = std::min(offset, file_->size());
+        text_.seek(offset);
     }
+    std::int64_t offset() const { return text_.offset(); }
 
-    std::int64_t offset() const { return next_ - static_cast<std::int64_t>(end_ - at_); }
-
-    /// The next `bytes`, fewer at the end of the file. Valid until the next call.
+    /// As TextReader's.
     Result<std::string_view> take(std::size_t bytes) {
         run_left_ = 0;
-        if (end_ - at_ < bytes)
-            if (auto filled = refill(); !filled) return filled.error();
-        const std::string_view taken(buffer_.data() + at_, std::min(bytes, end_ - at_));
-        at_ += taken.size();
-        return taken;
+        return text_.take(bytes);
     }
-
-    /// What stands between white space and white space; empty at the end of the file. Valid until the next call.
     Result<std::string_view> take_run() {
-        Result<std::string_view> run = find_run();
-        if (run) at_ += run->size();
-        return run;
+        run_left_ = 0;
+        return text_.take_run();
     }
 
     /// A right-aligned field of six. Records and lines may be padded or not, but within them a field ends six bytes
@@ -97,15 +80,15 @@ public:
         const std::int64_t due = offset() + static_cast<std::int64_t>(kIntegerBytes);
         bool new_line = false;
         if (run_left_ == 0) {
-            const Result<std::string_view> run = find_run(&new_line);
+            const Result<std::string_view> run = text_.find_run(&new_line);
             if (!run) return run.error();
             if (run->empty()) return broken("the file ends before it");
             run_left_ = run->size();
         }
         // Fields without space between them are full, but for the first.
         const std::size_t bytes = (run_left_ - 1) % kIntegerBytes + 1;
-        const std::string_view text(buffer_.data() + at_, bytes);
-        at_ += bytes;
+        const std::string_view text = text_.buffered().substr(0, bytes);
+        text_.skip(bytes);
         run_left_ -= bytes;
         std::int32_t value = 0;
         const char* first = text.data() + (text[0] == '+' ? 1 : 0);
@@ -118,38 +101,8 @@ public:
     }
 
 private:
-    Result<std::string_view> find_run(bool* new_line = nullptr) {
-        run_left_ = 0;
-        while (true) {
-            for (; at_ < end_ && is_space(buffer_[at_]); ++at_)
-                if (new_line != nullptr && is_line_end(buffer_[at_])) *new_line = true;
-            std::size_t stop = at_;
-            while (stop < end_ && !is_space(buffer_[stop])) ++stop;
-            if (stop - at_ > kMaxRunBytes)
-                return broken(fmt::format("'{}...' is no number", std::string_view(buffer_.data() + at_, 20)));
-            if (stop < end_ || next_ == file_->size()) return std::string_view(buffer_.data() + at_, stop - at_);
-            if (auto filled = refill(); !filled) return filled.error();
-        }
-    }
-
-    Result<void> refill() {
-        std::memmove(buffer_.data(), buffer_.data() + at_, end_ - at_);
-        end_ -= at_;
-        at_ = 0;
-        const auto bytes = static_cast<std::size_t>(
-            std::min<std::int64_t>(file_->size() - next_, static_cast<std::int64_t>(buffer_.size() - end_)));
-        if (auto read = file_->read_at(next_, std::as_writable_bytes(std::span(buffer_.data() + end_, bytes))); !read)
-            return read;
-        end_ += bytes;
-        next_ += static_cast<std::int64_t>(bytes);
-        return {};
-    }
-
-    const ByteFile* file_;
-    std::vector<char> buffer_;
-    std::size_t at_ = 0, end_ = 0;  ///< what of the buffer is still to be read
-    std::size_t run_left_ = 0;      ///< bytes of a run of fields, all of them buffered
-    std::int64_t next_ = 0;         ///< offset of the byte after the buffer
+    TextReader text_;
+    std::size_t run_left_ = 0;  ///< bytes of a run of fields, all of them buffered
 };
 
 enum class Unit { radians = 0, feet = 1, metres = 2, arc_seconds = 3 };
