@@ -10,6 +10,7 @@
 
 #include "tools/source/grid_file.h"
 #include "tools/source/number_text.h"
+#include "tools/source/state_plane.h"
 #include "tools/source/text_reader.h"
 
 namespace scree {
@@ -110,7 +111,8 @@ enum class Datum { nad27 = 1, wgs72 = 2, wgs84 = 3, nad83 = 4, other };
 
 struct Header {
     bool geographic = false;
-    std::int64_t zone = 0;  ///< of UTM, negative in the south
+    bool state_plane = false;
+    std::int64_t zone = 0;  ///< of UTM, negative in the south; of a state plane, by FIPS
     Unit ground = Unit::metres;
     Unit height = Unit::metres;
     double step_x = 0, step_y = 0, step_z = 0;
@@ -124,17 +126,17 @@ Result<void> read_system(const std::string& path, std::string_view record, Heade
     if (integer_at(record, 150) == 2)
         return unusable_grid(path, "its samples are scattered (pattern 2); only regular grids are read");
     const auto system = integer_at(record, 156);
-    if (system == 2)
-        return unusable_grid(
-            path, "it lies in a state plane system (ground reference system 2); only geographic and UTM ones are read");
-    if (system != 0 && system != 1)
+    if (system != 0 && system != 1 && system != 2)
         return unusable_grid(path,
                              fmt::format("no USGS DEM that can be read: its ground reference system is '{}', but 0 "
-                                         "(geographic) or 1 (UTM) are known",
+                                         "(geographic), 1 (UTM) and 2 (state plane) are known",
                                          record.substr(156, kIntegerBytes)));
     header.geographic = system == 0;
+    header.state_plane = system == 2;
     const auto zone = integer_at(record, 162);
-    if (!header.geographic) {
+    if (header.state_plane) {
+        header.zone = zone.value_or(0);
+    } else if (!header.geographic) {
         if (!zone || *zone == 0 || std::abs(*zone) > 60)
             return unusable_grid(
                 path, fmt::format("its UTM zone is '{}', but zones are 1 to 60", record.substr(162, kIntegerBytes)));
@@ -145,7 +147,7 @@ Result<void> read_system(const std::string& path, std::string_view record, Heade
     if (!known)
         return unusable_grid(path, fmt::format("its ground unit is '{}', but {}", record.substr(528, kIntegerBytes),
                                                header.geographic ? "degrees come from 0 (radians) or 3 (arc-seconds)"
-                                                                 : "UTM coordinates are in 1 (feet) or 2 (metres)"));
+                                                                 : "planar coordinates are in 1 (feet) or 2 (metres)"));
     header.ground = static_cast<Unit>(*ground);
     const auto height = integer_at(record, 534);
     if (height != 1 && height != 2)
@@ -228,6 +230,22 @@ std::optional<std::size_t> find_first_profile(const ByteFile& file, std::string_
     return std::nullopt;
 }
 
+/// 0: none, or in a unit that leaves it open.
+int epsg_of_state_plane(const Header& header) {
+    if (header.datum == Datum::nad27 && header.ground == Unit::feet) return epsg_of_state_plane_nad27(header.zone);
+    if (header.datum == Datum::nad83 && header.ground == Unit::metres) return epsg_of_state_plane_nad83(header.zone);
+    return 0;
+}
+
+Result<void> check_state_plane(const std::string& path, const Header& header) {
+    if (!header.state_plane || epsg_of_state_plane(header) != 0) return {};
+    return unusable_grid(path, fmt::format("it lies in state plane zone {} on datum {}, in {}; those on NAD27 (1) in "
+                                           "US survey feet and on NAD83 (4) in metres are read where their zone is "
+                                           "known",
+                                           header.zone, static_cast<int>(header.datum),
+                                           header.ground == Unit::feet ? "feet" : "metres"));
+}
+
 Result<Header> read_header(const ByteFile& file) {
     const Result<std::string> start = file.head(kRecordBytes);
     if (!start) return start.error();
@@ -244,6 +262,7 @@ Result<Header> read_header(const ByteFile& file) {
     const std::size_t line_end = start->find_first_of("\r\n", kFixedBytes);
     read_datums(std::string_view(*start).substr(0, std::min(*first, line_end)), header);
     header.first_profile = static_cast<std::int64_t>(*first);
+    if (auto known = check_state_plane(path, header); !known) return known.error();
     return header;
 }
 
@@ -456,23 +475,32 @@ int epsg_of_geographic(Datum datum) {
     return kCodes[static_cast<int>(datum) - 1];
 }
 
+int epsg_of(const Header& header) {
+    if (header.state_plane) return epsg_of_state_plane(header);
+    return header.geographic ? epsg_of_geographic(header.datum) : epsg_of_utm(header.datum, header.zone);
+}
+
 Georeference place_of(const Grid& grid) {
     const Header& header = grid.header;
+    // A state plane's CRS counts in the unit of the file.
+    const Unit unit = header.state_plane ? Unit::metres : header.ground;
     Georeference place;
-    place.column_x = step_in_units_of_crs(header.step_x, grid.columns, header.ground);
-    place.row_y = -step_in_units_of_crs(header.step_y, grid.rows, header.ground);
-    place.first_x = in_units_of_crs(grid.west, header.ground);
-    place.first_y = in_units_of_crs(grid.south + static_cast<double>(grid.rows - 1) * header.step_y, header.ground);
+    place.column_x = step_in_units_of_crs(header.step_x, grid.columns, unit);
+    place.row_y = -step_in_units_of_crs(header.step_y, grid.rows, unit);
+    place.first_x = in_units_of_crs(grid.west, unit);
+    place.first_y = in_units_of_crs(grid.south + static_cast<double>(grid.rows - 1) * header.step_y, unit);
     place.raster_is_point = true;
     place.geographic = header.geographic;
     place.vertical_datum = header.vertical_datum;
     place.height_unit_m = header.height == Unit::feet ? 0.3048 : 1;
-    const int epsg = header.geographic ? epsg_of_geographic(header.datum) : epsg_of_utm(header.datum, header.zone);
+    const int epsg = epsg_of(header);
     if (epsg == 0) return place;
     constexpr const char* kDatums[] = {"NAD27", "WGS 72", "WGS 84", "NAD83"};
     place.crs = fmt::format("EPSG:{}", epsg);
     place.crs_name = kDatums[static_cast<int>(header.datum) - 1];
-    if (!header.geographic)
+    if (header.state_plane)
+        place.crs_name += fmt::format(" / state plane zone {}", header.zone);
+    else if (!header.geographic)
         place.crs_name += fmt::format(" / UTM zone {}{}", std::abs(header.zone), header.zone > 0 ? 'N' : 'S');
     return place;
 }
