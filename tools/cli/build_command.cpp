@@ -29,6 +29,7 @@ void print_plan(const BuildPlan& plan) {
     const MosaicPlan& m = plan.mosaic;
     if (!m.crs_reason.empty()) note("CRS: {}\n", m.crs_reason);
     if (!m.heights_copied) note("heights are resampled: their samples are no square grid of {}\n", crs_label(d));
+    for (const std::string& conversion : m.conversions) note("{}\n", conversion);
     for (const std::string& warning : m.warnings) note("warning: {}\n", warning);
     note("textures: {} levels, {} m a texel; memory: about {} MiB\n", d.texture_deepest_level + 1,
          d.texel_m(d.texture_deepest_level), plan.memory_bytes >> 20);

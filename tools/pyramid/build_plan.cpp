@@ -54,8 +54,8 @@ bool north_up(const Georeference& where) { return where.axis_aligned() && where.
 // Files that are read straight through, row by row, need no copy.
 void choose_ways(BuildPlan& plan) {
     const MosaicPlan& m = plan.mosaic;
-    plan.heights_in_place =
-        m.base_shift == 0 && m.heights.size() == 1 && m.heights_copied && north_up(m.heights.front().where);
+    plan.heights_in_place = m.base_shift == 0 && m.heights.size() == 1 && m.heights_copied && m.same_units &&
+                             north_up(m.heights.front().where);
     plan.integer_heights =
         m.heights_copied && m.same_units &&
         std::all_of(m.heights.begin(), m.heights.end(), [](const PlacedFile& f) { return is_integer(f.info.type); });
