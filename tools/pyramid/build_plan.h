@@ -37,6 +37,10 @@ struct BuildOptions : HeightReading {
     bool quiet = false;
 };
 
+/// The last two hexadecimal digits of SourceRecord::layer: which sides of a file are sides of its layer, and whether
+/// they run north and east in the dataset's CRS.
+inline constexpr unsigned kWestSide = 1, kNorthSide = 2, kEastSide = 4, kSouthSide = 8, kStraight = 16;
+
 struct BuildPlan {
     explicit BuildPlan(MosaicPlan m) : mosaic(std::move(m)) {}
 

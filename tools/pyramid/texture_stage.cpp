@@ -193,6 +193,7 @@ Result<void> TextureStage::build_crown() {
     const Dataset& d = job_.dataset;
     const int seeds = seed_level(d);
     if (seeds == 0) return {};
+    if (auto ok = job_.writer->flush(); !ok) return ok;
     const std::int64_t columns = district_columns(), rows = district_rows(), size = d.texture_size();
     std::vector<std::uint8_t> stored(static_cast<std::size_t>(columns * rows));
     std::vector<std::uint8_t> band(static_cast<std::size_t>(size * columns * size * 4));

@@ -45,7 +45,7 @@ public:
     /// Builds a rectangle of them and hands their seeds on. Imagery is asked for from north to south.
     Result<void> build_districts(std::int64_t first_column, std::int64_t first_row, std::int64_t columns,
                                  std::int64_t rows);
-    /// After all districts that change, their rows flushed.
+    /// After all districts that change.
     Result<void> build_crown();
 
     /// Bytes held, imagery aside, for so many texels side by side.
