@@ -82,6 +82,8 @@ std::vector<Named> encoders(const std::set<std::string>& wanted) {
                            {"SSE2", by_kernel<scree::bc1_kernel_sse2>, true},
                            {"AVX2", by_kernel<scree::bc1_kernel_avx2>, avx2},
                            {"AVX-512", by_kernel<scree::bc1_kernel_avx512>, avx512},
+                           {"high AVX2", by_kernel<scree::bc1_high_kernel_avx2>, avx2},
+                           {"high AVX-512", by_kernel<scree::bc1_high_kernel_avx512>, avx512},
                            {"squish cluster", by_blocks<squish_cluster>, true}};
     std::erase_if(
         all, [&](const Named& named) { return !named.runs_here || (!wanted.empty() && !wanted.contains(named.name)); });

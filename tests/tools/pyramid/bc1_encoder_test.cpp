@@ -505,7 +505,7 @@ TEST(Bc1Kernel, TheBestOneIsTheWidestThatRunsHere) {
             widest = kernel.kernel;
         }
     }
-    EXPECT_EQ(best_bc1_kernel(), widest);
+    EXPECT_EQ(best_bc1_kernel(TextureQuality::normal), widest);
 }
 
 }  // namespace
