@@ -1,8 +1,8 @@
 // The kernel of high quality, included after bc1_kernel_body.h. Tries many endpoints for each block and keeps those of
-// the least squared error: least squares from several cuts along two axes, in four and in three colours, then the
-// neighbouring codes of each endpoint (R. Geldreich, rgbcx, searches so too). No lane looks at another one here either.
+// the least squared error: least squares from several cuts along two axes, then the neighbouring codes of each endpoint
+// (R. Geldreich, rgbcx, searches so too). No lane looks at another one here either.
 
-/// Six times the texels: in sixths of a level all of BC1's colours, and half the loss in showing them, are integers.
+/// Six times the texels: in sixths of a level the four colours, and half the loss in showing them, are integers.
 struct Sixths {
     Ints channel[3][kPairs];
 };
@@ -23,7 +23,6 @@ inline Ints level_of(Ints code) {
 }
 
 /// 36 times the squared error: below 2^27.
-template <int kSteps>
 inline Ints error_of(const Sixths& sixths, const Endpoints& ends, const Weights& weights) {
     const Ints high[3] = {level_of<5>(ends.high[0]), level_of<6>(ends.high[1]), level_of<5>(ends.high[2])};
     const Ints low[3] = {level_of<5>(ends.low[0]), level_of<6>(ends.low[1]), level_of<5>(ends.low[2])};
@@ -31,13 +30,13 @@ inline Ints error_of(const Sixths& sixths, const Endpoints& ends, const Weights&
     Ints step[3];
     for (int c = 0; c < 3; ++c) {
         base[c] = mul_low16(both_halves(low[c]), splat(0x00060006));
-        step[c] = mul_low16(both_halves(sub16(high[c], low[c])), splat(6 / kSteps * 0x00010001));
+        step[c] = mul_low16(both_halves(sub16(high[c], low[c])), splat(0x00020002));
     }
     Ints error = zero();
     for (int i = 0; i < kPairs; ++i) {
         const Ints w = weights.pair[i];
-        // Interpolated colours, weights 1 and 2 of 3 or 1 of 2, are shown a sixth of a level lower.
-        const Ints interpolated = (kSteps == 3 ? w ^ shift_right16<1>(w) : w) & splat(0x00010001);
+        // Interpolated colours, weights 1 and 2, are shown a sixth of a level lower.
+        const Ints interpolated = (w ^ shift_right16<1>(w)) & splat(0x00010001);
         for (int c = 0; c < 3; ++c) {
             const Ints shown = sub16(add16(base[c], mul_low16(w, step[c])), interpolated);
             const Ints off = sub16(sixths.channel[c][i], shown);
@@ -47,45 +46,42 @@ inline Ints error_of(const Sixths& sixths, const Endpoints& ends, const Weights&
     return error;
 }
 
-inline Line line_of(const Endpoints& ends, float steps) {
+inline Line line_of(const Endpoints& ends) {
     const Floats high[3] = {decoded<5>(ends.high[0]), decoded<6>(ends.high[1]), decoded<5>(ends.high[2])};
     const Floats low[3] = {decoded<5>(ends.low[0]), decoded<6>(ends.low[1]), decoded<5>(ends.low[2])};
     Line line;
     for (int c = 0; c < 3; ++c) {
         line.mid[c] = splat(0.5F) * (high[c] + low[c]);
-        line.half[c] = splat(0.5F / steps) * (high[c] - low[c]);
+        line.half[c] = splat(0.5F / 3.0F) * (high[c] - low[c]);
     }
     return line;
 }
 
-/// The search in one of the two modes.
-template <int kSteps>
+/// Cuts of the range. Measured: the outer two gain 0.2 dB on roofs and streets, 0.02 elsewhere.
+constexpr Cut kHighCuts[] = {{-0.08F, kLimitDistance, 100.0F},
+                             {0.08F, kLimitDistance, 100.0F},
+                             {-0.24F, kLimitDistance, 100.0F},
+                             {0.24F, kLimitDistance, 100.0F}};
+
 struct Search {
     const Texels& texels;
-    const Sixths& sixths;
     const Sums& sums;
-    Floats n = splat(16.0F);
-    Ints opaque[kPairs];
+    Sixths sixths;
     Endpoints best;
-    Ints best_error = splat(0x7FFFFFFF);
+    Ints best_error;
 
-    Search(const Texels& t, const Sixths& six, const Sums& s) : texels(t), sixths(six), sums(s) {
-        for (int i = 0; i < kPairs; ++i) {
-            opaque[i] = splat(-1);
-        }
+    Search(const Texels& t, const Sums& s) : texels(t), sums(s), sixths(sixths_of(t)), best_error(splat(0x7FFFFFFF)) {
         for (int c = 0; c < 3; ++c) {
             best.high[c] = zero();
             best.low[c] = zero();
         }
     }
 
-    Weights weights_of(const Endpoints& ends) const {
-        return weights_for<kSteps>(texels, line_of(ends, static_cast<float>(kSteps)), opaque);
-    }
+    Weights weights_of(const Endpoints& ends) const { return weights_for<3>(texels, line_of(ends), nullptr); }
 
     /// Keeps the endpoints in the lanes where they are better.
     void consider(const Endpoints& ends, const Weights& weights) {
-        const Ints error = error_of<kSteps>(sixths, ends, weights);
+        const Ints error = error_of(sixths, ends, weights);
         const Mask better = less32(error, best_error);
         best_error = select(better, error, best_error);
         for (int c = 0; c < 3; ++c) {
@@ -94,11 +90,12 @@ struct Search {
         }
     }
 
-    void fit_from(Weights weights, int fits) {
-        for (int fit = 0; fit < fits; ++fit) {
+    void fit_twice(Weights weights) {
+        const Floats n = splat(16.0F);
+        for (int fit = 0; fit < 2; ++fit) {
             const Moments moments = moments_of(texels, weights);
-            const Endpoints ends = rounded<kSteps>(fit_line<kSteps>(sums, moments, n), moments, n);
-            weights = weights_of(ends);
+            const Endpoints ends = rounded<3>(fit_line<3>(sums, moments, n), moments, n);
+            weights = weights_for<3>(texels, ends.line, nullptr);
             consider(ends, weights);
         }
     }
@@ -112,39 +109,28 @@ struct Search {
         consider(ends, weights_of(ends));
     }
 
+    /// One endpoint up or down, or both, apart or together.
     void try_neighbours() {
+        constexpr int kMoves[6][2] = {{-1, 0}, {0, -1}, {0, 1}, {1, 0}, {-1, 1}, {1, -1}};
         for (int c = 0; c < 3; ++c) {
-            for (int high_by = -1; high_by <= 1; ++high_by) {
-                for (int low_by = -1; low_by <= 1; ++low_by) {
-                    if (high_by != 0 || low_by != 0) {
-                        try_neighbour(c, high_by, low_by);
-                    }
-                }
+            for (const int* move : kMoves) {
+                try_neighbour(c, move[0], move[1]);
             }
         }
     }
 
     void run(const Axis& principal) {
-        constexpr float kScale = kSteps == 3 ? 1.0F : 1.5F;
-        constexpr float kCentres[] = {-0.12F, 0.0F, 0.12F};
-        constexpr float kDistances[] = {0.20F, 0.28F, 0.36F};
-        for (const float centre : kCentres) {
-            for (const float distance : kDistances) {
-                fit_from(first_weights<kSteps>(texels, principal, {centre, kScale * distance, 100.0F}, opaque), 2);
-            }
+        for (const Cut& cut : kHighCuts) {
+            fit_twice(first_weights<3>(texels, principal, cut, nullptr));
         }
+        fit_twice(first_weights<3>(texels, principal, kCutInFour, nullptr));
         Axis grey;
         for (Ints& channel : grey.channel) {
             channel = splat(9459 * 0x00010001);  // 16383 / sqrt 3
         }
-        const Axis axes[] = {principal, grey};
-        for (const Axis& axis : axes) {
-            fit_from(first_weights<kSteps>(texels, axis, {0.0F, kScale * kLimitDistance, kShortestRange}, opaque), 3);
-        }
-        for (int round = 0; round < 2; ++round) {
-            fit_from(weights_of(best), 2);
-            try_neighbours();
-        }
+        fit_twice(first_weights<3>(texels, grey, kCutInFour, nullptr));
+        fit_twice(weights_of(best));
+        try_neighbours();
     }
 };
 
@@ -154,16 +140,10 @@ inline void encode_high_batch(Group* groups, size_t group_count, size_t row_byte
         group.transparent = lane_bits(load_texels(group.rgba, row_bytes, group.texels));
         group.sums = sum_texels(group.texels);
         group.axis = principal_axis(group.texels, group.sums, splat(16.0F), group.plain);
-        const Sixths sixths = sixths_of(group.texels);
-        Search<3> four(group.texels, sixths, group.sums);
-        four.run(group.axis);
-        Search<2> three(group.texels, sixths, group.sums);
-        three.run(group.axis);
-        const Packed in_four = packed_in_four(four.best, four.weights_of(four.best));
-        const Packed in_three = packed_in_three(three.best, three.weights_of(three.best));
-        const Mask three_better = less32(three.best_error, four.best_error);
-        store_blocks(group.out, select(three_better, in_three.ends, in_four.ends),
-                     select(three_better, in_three.selectors, in_four.selectors));
-        group.plain |= collapsed(four.best) & ~lane_bits(three_better);
+        Search search(group.texels, group.sums);
+        search.run(group.axis);
+        group.ends = search.best;
+        group.weights = search.weights_of(search.best);
+        write_group(group);
     }
 }
