@@ -7,7 +7,7 @@
 
 namespace scree {
 
-/// high: endpoints are searched for, a tenth of the speed and less; at least what libsquish's cluster fit reaches.
+/// high: endpoints are searched for, at a fifteenth of the speed; as near as libsquish's cluster fit comes, or nearer.
 enum class TextureQuality { normal, high };
 
 /// Encodes the four pixel rows starting at `rgba` (8-bit R,G,B,A; `row_bytes` from one row to the next) as
