@@ -177,16 +177,22 @@ bool bc1_kernel_avx512_runs_here() {
     return __builtin_cpu_supports("avx512bw") != 0 && __builtin_cpu_supports("avx512vnni") != 0;
 }
 
-Bc1Kernel* best_bc1_kernel() {
+Bc1Kernel* best_bc1_kernel(TextureQuality quality) {
+    const bool high = quality == TextureQuality::high;
     if (bc1_kernel_avx512_runs_here()) {
-        return bc1_kernel_avx512;
+        return high ? bc1_high_kernel_avx512 : bc1_kernel_avx512;
     }
-    return __builtin_cpu_supports("avx2") ? bc1_kernel_avx2 : bc1_kernel_sse2;
+    if (__builtin_cpu_supports("avx2")) {
+        return high ? bc1_high_kernel_avx2 : bc1_kernel_avx2;
+    }
+    return high ? bc1_high_kernel_sse2 : bc1_kernel_sse2;
 }
 
-void encode_bc1_row(const std::uint8_t* rgba, std::size_t row_bytes, std::size_t block_count, std::uint8_t* out) {
-    static Bc1Kernel* const kernel = best_bc1_kernel();
-    encode_bc1_row_with(kernel, rgba, row_bytes, block_count, out);
+void encode_bc1_row(const std::uint8_t* rgba, std::size_t row_bytes, std::size_t block_count, std::uint8_t* out,
+                    TextureQuality quality) {
+    static Bc1Kernel* const normal = best_bc1_kernel(TextureQuality::normal);
+    static Bc1Kernel* const high = best_bc1_kernel(TextureQuality::high);
+    encode_bc1_row_with(quality == TextureQuality::high ? high : normal, rgba, row_bytes, block_count, out);
 }
 
 }  // namespace scree

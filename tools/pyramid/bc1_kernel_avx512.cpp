@@ -18,6 +18,8 @@ inline Ints load(const uint8_t* p) { return _mm512_loadu_si512(p); }
 inline Ints first_of_16_bytes(Ints a) { return _mm512_shuffle_epi32(a, _MM_PERM_AAAA); }
 inline bool is_zero(Ints a) { return _mm512_test_epi32_mask(a, a) == 0; }
 inline Ints add16(Ints a, Ints b) { return _mm512_add_epi16(a, b); }
+inline Ints sub16(Ints a, Ints b) { return _mm512_sub_epi16(a, b); }
+inline Ints mul_low16(Ints a, Ints b) { return _mm512_mullo_epi16(a, b); }
 inline Ints add32(Ints a, Ints b) { return _mm512_add_epi32(a, b); }
 inline Ints min16(Ints a, Ints b) { return _mm512_min_epi16(a, b); }
 inline Ints max16(Ints a, Ints b) { return _mm512_max_epi16(a, b); }
@@ -27,6 +29,10 @@ inline Ints mul_round16(Ints a, Ints b) { return _mm512_mulhrs_epi16(a, b); }
 template <int kBits>
 inline Ints shift_left16(Ints a) {
     return _mm512_slli_epi16(a, kBits);
+}
+template <int kBits>
+inline Ints shift_right16(Ints a) {
+    return _mm512_srli_epi16(a, kBits);
 }
 template <int kBits>
 inline Ints shift_left32(Ints a) {
@@ -86,11 +92,16 @@ inline void store_blocks(uint8_t* out, Ints endpoints, Ints selectors) {
 }
 
 #include "tools/pyramid/bc1_kernel_body.h"
+#include "tools/pyramid/bc1_kernel_high_body.h"
 
 }  // namespace
 
 void bc1_kernel_avx512(const uint8_t* rgba, size_t row_bytes, size_t block_count, uint8_t* out) {
-    encode_groups(rgba, row_bytes, block_count, out);
+    encode_groups<encode_batch>(rgba, row_bytes, block_count, out);
+}
+
+void bc1_high_kernel_avx512(const uint8_t* rgba, size_t row_bytes, size_t block_count, uint8_t* out) {
+    encode_groups<encode_high_batch>(rgba, row_bytes, block_count, out);
 }
 
 }  // namespace scree

@@ -33,14 +33,23 @@ constexpr float kInterpolationLoss = 1.0F / 6.0F;
 /// the time; a third one would gain 0.03 dB.
 constexpr int kFits = 2;
 
-/// The limits of the first guess lie this share of the range apart: less than a third, for most texels lie between the
-/// extremes.
+/// How the first guess cuts the range along the axis.
+struct Cut {
+    float centre;    // of the limits, as a share of the range from its middle
+    float distance;  // between limits, as a share of the range
+    float shortest;  // ranges below are taken as this one
+};
+
+/// The limits lie less than a third of the range apart, for most texels lie between the extremes.
 constexpr float kLimitDistance = 0.28F;
 
 /// Shorter ranges are taken as this one, 44 levels along one channel or 15 along grey. Smooth blocks so start with the
 /// middle weights, which leaves the endpoints free to lie apart as far as 5 and 6 bits have them. Measured on snow:
 /// half of it -0.25 dB.
 constexpr float kShortestRange = 700.0F;
+
+constexpr Cut kCutInFour = {0.0F, kLimitDistance, kShortestRange};
+constexpr Cut kCutInThree = {0.0F, 1.5F * kLimitDistance, kShortestRange};
 
 /// Groups that go through a stage together. 2 to 8 run alike, 1 is a fifth slower; 4 of the widest take 14 KB of stack.
 constexpr size_t kBatchGroups = 4;
@@ -197,7 +206,7 @@ inline Ints weight_of(Ints units) {
 /// The first guess: limits around the middle of the range along the axis. Transparent texels, where there are any, do
 /// not count.
 template <int kSteps>
-inline Weights first_weights(const Texels& texels, const Axis& axis, const Ints* opaque) {
+inline Weights first_weights(const Texels& texels, const Axis& axis, const Cut& cut, const Ints* opaque) {
     Ints along[kPairs];
     Ints smallest = splat(0x7FFF7FFF);
     Ints largest = splat(static_cast<int>(0x80008000U));
@@ -216,9 +225,8 @@ inline Weights first_weights(const Texels& texels, const Axis& axis, const Ints*
     }
     const Floats low = to_floats(low_half_signed(min16(smallest, shift_right_signed32<16>(smallest))));
     const Floats high = to_floats(low_half_signed(max16(largest, shift_right_signed32<16>(largest))));
-    constexpr float kDistance = kSteps == 3 ? kLimitDistance : 1.5F * kLimitDistance;
-    const Floats gain = splat(kUnit * 32768.0F / kDistance) / maximum(high - low, splat(kShortestRange));
-    const Floats middle = splat(0.5F) * (high + low);
+    const Floats gain = splat(kUnit * 32768.0F / cut.distance) / maximum(high - low, splat(cut.shortest));
+    const Floats middle = splat(0.5F + cut.centre) * high + splat(0.5F - cut.centre) * low;
     const Ints start =
         both_halves(truncate(splat(kUnit * 0.5F * (kSteps + 1)) - middle * gain * splat(1.0F / 32768.0F)));
     const Ints gains = both_halves(truncate(gain));
@@ -375,20 +383,51 @@ inline Ints packed_weights(const Weights& weights) {
 
 constexpr int kLowBits = 0x55555555;
 
-inline void write_group(Group& group) {
-    const Ints w = packed_weights(group.weights);
+/// As the format has them.
+struct Packed {
+    Ints ends;
+    Ints selectors;
+};
+
+/// Four-colour mode wants the greater endpoint first.
+inline Packed packed_in_four(const Endpoints& ends, const Weights& weights) {
+    const Ints w = packed_weights(weights);
     // Weight 3, 0, 2, 1 is selector 0, 1, 2, 3.
-    const Ints high_bits = splat(~kLowBits);
-    const Ints flipped = ((w ^ shift_left32<1>(w)) & high_bits) | (shift_right32<1>(w ^ splat(-1)) & splat(kLowBits));
-    const Ints high = packed565(group.ends.high);
-    const Ints low = packed565(group.ends.low);
-    // Four-colour mode wants the greater endpoint first; exchanging them flips the low bit of each selector.
+    const Ints flipped =
+        ((w ^ shift_left32<1>(w)) & splat(~kLowBits)) | (shift_right32<1>(w ^ splat(-1)) & splat(kLowBits));
+    const Ints high = packed565(ends.high);
+    const Ints low = packed565(ends.low);
+    // Exchanging the endpoints flips the low bit of each selector.
     const Mask exchange = less32(high, low);
     const Ints first = select(exchange, low, high);
     const Ints second = select(exchange, high, low);
-    const Ints selectors = flipped ^ select(exchange, splat(kLowBits), zero());
-    store_blocks(group.out, first | shift_left32<16>(second), selectors);
-    group.plain |= lane_bits(equal32(high, low));
+    return {first | shift_left32<16>(second), flipped ^ select(exchange, splat(kLowBits), zero())};
+}
+
+/// Three-colour mode wants the greater endpoint second.
+inline Packed packed_in_three(const Endpoints& ends, const Weights& weights) {
+    const Ints high = packed565(ends.high);
+    const Ints low = packed565(ends.low);
+    // Weight 0, 2, 1 is selector 0, 1, 2, and 1, 0, 2 after an exchange.
+    const Mask exchange = less32(high, low);
+    const Ints w = packed_weights(weights);
+    const Ints middle = shift_left32<1>(w & splat(kLowBits));
+    const Ints far = shift_right32<1>(w) & splat(kLowBits);
+    const Ints near = (far | shift_right32<1>(middle)) ^ splat(kLowBits);
+    const Ints first = select(exchange, high, low);
+    const Ints second = select(exchange, low, high);
+    return {first | shift_left32<16>(second), select(exchange, near, far) | middle};
+}
+
+/// Lanes whose endpoints are alike.
+inline unsigned collapsed(const Endpoints& ends) {
+    return lane_bits(equal32(packed565(ends.high), packed565(ends.low)));
+}
+
+inline void write_group(Group& group) {
+    const Packed packed = packed_in_four(group.ends, group.weights);
+    store_blocks(group.out, packed.ends, packed.selectors);
+    group.plain |= collapsed(group.ends);
 }
 
 /// Runs each stage over all groups of the batch before the next one: a stage is a long chain of dependent operations,
@@ -404,7 +443,7 @@ inline void encode_batch(Group* groups, size_t group_count, size_t row_bytes) {
         groups[g].axis = principal_axis(groups[g].texels, groups[g].sums, n, groups[g].plain);
     }
     for (size_t g = 0; g < group_count; ++g) {
-        groups[g].weights = first_weights<3>(groups[g].texels, groups[g].axis, nullptr);
+        groups[g].weights = first_weights<3>(groups[g].texels, groups[g].axis, kCutInFour, nullptr);
     }
     for (int fit = 0; fit < kFits; ++fit) {
         for (size_t g = 0; g < group_count; ++g) {
@@ -461,7 +500,7 @@ inline void encode_mixed(MixedBlocks& blocks) {
     const Sums sums = sum_texels(texels);
     unsigned plain = 0;
     const Axis axis = principal_axis(texels, sums, n, plain);
-    Weights weights = first_weights<2>(texels, axis, opaque);
+    Weights weights = first_weights<2>(texels, axis, kCutInThree, opaque);
     Endpoints ends;
     for (int fit = 0; fit < kFits; ++fit) {
         const Moments moments = moments_of(texels, weights);
@@ -472,21 +511,10 @@ inline void encode_mixed(MixedBlocks& blocks) {
     for (int i = 0; i < kPairs; ++i) {
         transparent.pair[i] = (opaque[i] ^ splat(-1)) & splat(0x00030003);
     }
-    const Ints high = packed565(ends.high);
-    const Ints low = packed565(ends.low);
-    // Three-colour mode wants the greater endpoint second; weight 0, 2, 1 is selector 0, 1, 2 then, and 1, 0, 2 after
-    // an exchange.
-    const Mask exchange = less32(high, low);
-    const Ints w = packed_weights(weights);
-    const Ints middle = shift_left32<1>(w & splat(kLowBits));
-    const Ints far = shift_right32<1>(w) & splat(kLowBits);
-    const Ints near = (far | shift_right32<1>(middle)) ^ splat(kLowBits);
-    const Ints selectors = select(exchange, near, far) | middle | packed_weights(transparent);
-    const Ints first = select(exchange, high, low);
-    const Ints second = select(exchange, low, high);
-    plain |= lane_bits(equal32(high, low));
+    plain |= collapsed(ends);
+    const Packed packed = packed_in_three(ends, weights);
     uint8_t out[kLanes * 8];
-    store_blocks(out, first | shift_left32<16>(second), selectors);
+    store_blocks(out, packed.ends, packed.selectors | packed_weights(transparent));
     for (size_t lane = 0; lane < kLanes; ++lane) {
         const size_t block = kBlockOfLane[lane];
         if (block >= blocks.count) {
@@ -571,6 +599,7 @@ inline void encode_plain_group(const uint8_t* rgba, uint8_t* out) {
     }
 }
 
+template <void (*kEncodeBatch)(Group* groups, size_t group_count, size_t row_bytes)>
 inline void encode_groups(const uint8_t* rgba, size_t row_bytes, size_t block_count, uint8_t* out) {
     Group groups[kBatchGroups];
     MixedBlocks mixed;
@@ -586,7 +615,7 @@ inline void encode_groups(const uint8_t* rgba, size_t row_bytes, size_t block_co
             ++gathered;
         }
         if (gathered == kBatchGroups || (gathered != 0 && block + kLanes == block_count)) {
-            encode_batch(groups, gathered, row_bytes);
+            kEncodeBatch(groups, gathered, row_bytes);
             for (size_t g = 0; g < gathered; ++g) {
                 finish_group(groups[g], row_bytes, mixed);
             }
