@@ -237,4 +237,9 @@ Result<void> decode_height_tile(std::span<const std::uint8_t> payload, int n, in
     return {};
 }
 
+std::optional<HeightMarks> height_marks(std::span<const std::uint8_t> payload) {
+    if (payload.size() < 2) return std::nullopt;
+    return HeightMarks{static_cast<std::uint8_t>(payload[0] & 15), (payload[1] & kHasPresence) != 0};
+}
+
 }  // namespace scree

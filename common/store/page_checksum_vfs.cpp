@@ -33,13 +33,14 @@ int file_read(sqlite3_file* f, void* buffer, int amount, sqlite3_int64 offset) {
 int file_write(sqlite3_file* f, const void* buffer, int amount, sqlite3_int64 offset) {
     if (!self(f)->is_database || !is_page(amount) || offset % amount != 0)
         return inner(f)->pMethods->xWrite(inner(f), buffer, amount, offset);
-    thread_local std::vector<std::uint8_t> page;
-    const auto* bytes = static_cast<const std::uint8_t*>(buffer);
-    page.assign(bytes, bytes + amount);
-    const std::uint64_t sum = page_checksum(page, static_cast<std::uint64_t>(offset / amount) + 1);
+    // Into SQLite's own copy of the page, in bytes that it does not use: so the journal of a later transaction holds a
+    // page that is right again when any SQLite brings it back.
+    auto* page = static_cast<std::uint8_t*>(const_cast<void*>(buffer));
+    const auto size = static_cast<std::size_t>(amount);
+    const std::uint64_t sum = page_checksum({page, size}, static_cast<std::uint64_t>(offset / amount) + 1);
     for (std::size_t k = 0; k < kPageChecksumBytes; ++k)
-        page[page.size() - kPageChecksumBytes + k] = static_cast<std::uint8_t>(sum >> (8 * k));
-    return inner(f)->pMethods->xWrite(inner(f), page.data(), amount, offset);
+        page[size - kPageChecksumBytes + k] = static_cast<std::uint8_t>(sum >> (8 * k));
+    return inner(f)->pMethods->xWrite(inner(f), buffer, amount, offset);
 }
 int file_truncate(sqlite3_file* f, sqlite3_int64 size) { return inner(f)->pMethods->xTruncate(inner(f), size); }
 int file_sync(sqlite3_file* f, int flags) { return inner(f)->pMethods->xSync(inner(f), flags); }

@@ -122,25 +122,6 @@ HeightBounds bounds_over(std::span<const HeightBounds> children, std::span<const
     return bounds;
 }
 
-void DeepPresence::note_leaf(TileId leaf, std::span<const std::uint8_t> cells) {
-    if (cells.empty()) return;
-    std::vector<bool> bits(cells.size());
-    for (std::size_t k = 0; k < cells.size(); ++k) bits[k] = cells[k] != 0;
-    const std::lock_guard lock(mutex_);
-    partial_.emplace(leaf, std::move(bits));
-}
-
-void DeepPresence::note_stored(TileId id) {
-    if (id.level > deepest_noted_level_) return;
-    const std::lock_guard lock(mutex_);
-    stored_.insert(id);
-}
-
-bool DeepPresence::present(TileId leaf, std::size_t cell) const {
-    const auto found = partial_.find(leaf);
-    return found == partial_.end() || found->second[cell];
-}
-
 // On the way down: what the tiles above can draw over this one.
 struct DeepBranches::Place {
     TileId base;
@@ -200,10 +181,8 @@ Result<BranchSummary> DeepBranches::leaf(TileId id, const Place& place) const {
             summary.present_cells += present;
         }
     if (summary.present_cells == m * m) tile.presence.clear();
-    presence_.note_leaf(id, tile.presence);
     if (summary.present_cells == 0) return summary;
     summary.exists = true;
-    presence_.note_stored(id);
     const auto vertices = present_vertices(tile.presence, n);
     const FinestVertices finest{tile.samples.data(), vertices.empty() ? nullptr : vertices.data(), n};
     const SampleRange range = range_of(tile.samples);

@@ -1,7 +1,6 @@
 #include "tools/pyramid/height_pyramid.h"
 
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_invoke.h>
 
 #include <algorithm>
 #include <atomic>
@@ -100,12 +99,6 @@ struct TileDraft {
     }
 };
 
-// Tiles that wait to be stored while the next band is made.
-struct WaitingTile {
-    TileId id;
-    std::vector<std::uint8_t> payload;
-};
-
 class Builder {
 public:
     explicit Builder(const HeightPyramidJob& job)
@@ -115,7 +108,6 @@ public:
           n_(job.lattice.tile_cells_log2),
           width_(job.lattice.cells_x + 1),
           corners_(job.lattice) {
-        result_.tiles = TileSet(lattice_, lattice_.deepest_level);
         for (int level = 0; level <= lattice_.deepest_level; ++level) {
             LevelBand band;
             band.step = lattice_.step(level);
@@ -128,23 +120,18 @@ public:
         }
         valid_.resize(static_cast<std::size_t>((m_ + 1) * width_));
         if (job.deep_tree != nullptr)
-            branches_.emplace(job.finest, *job.deep_tree, *job.deep_heights, *job.deep_presence,
-                              [this](TileId id, const std::vector<std::uint8_t>& payload) { return put(id, payload); });
+            branches_.emplace(
+                job.finest, *job.deep_tree, *job.deep_heights,
+                [this](TileId id, std::vector<std::uint8_t> payload) { return put(id, std::move(payload)); });
     }
 
     Result<HeightPyramidResult> run() {
         if (auto ok = gather_corners(); !ok) return ok.error();
         const std::int64_t bands = (lattice_.cells_y + m_ - 1) / m_;
-        for (std::int64_t band = 0; band < bands; ++band) {
-            std::vector<WaitingTile> earlier;
-            earlier.swap(waiting_);
-            Result<void> stored, made;
-            tbb::parallel_invoke([&] { stored = store(earlier); }, [&] { made = make_band(); });
-            if (!made) return made.error();
-            if (!stored) return stored.error();
-        }
+        for (std::int64_t band = 0; band < bands; ++band)
+            if (auto ok = make_band(); !ok) return ok.error();
         if (auto ok = flush(); !ok) return ok.error();
-        if (auto ok = store(waiting_); !ok) return ok.error();
+        result_.tile_count = tile_count_;
         result_.min_n = range_.min_n;
         result_.max_n = range_.max_n;
         result_.worst_quantum_error_m = range_.worst_error_m;
@@ -185,7 +172,8 @@ private:
         for (int level = lattice_.deepest_level - 1; level >= 0; --level) {
             LevelBand& band = levels_[static_cast<std::size_t>(level)];
             band.rows = std::min(last / band.step - band.band * m_, m_) + 1;
-            if (band.rows > m_) finish_coarser(level, band);
+            if (band.rows <= m_) continue;
+            if (auto ok = finish_coarser(level, band); !ok) return ok;
         }
         return {};
     }
@@ -258,7 +246,7 @@ private:
             LevelBand& band = levels_[static_cast<std::size_t>(level)];
             if (band.band * lattice_.tile_extent(level) >= lattice_.cells_y) continue;
             repeat_to_end(band);
-            finish_coarser(level, band);
+            if (auto ok = finish_coarser(level, band); !ok) return ok;
         }
         return {};
     }
@@ -291,7 +279,7 @@ private:
                 range_.include({record.branch->min_n, record.branch->max_n, record.branch->worst_quantum_error_m});
             }
             result_.present_cells += record.present_cells;
-            keep({lattice_.deepest_level, x, band.band}, record, !record.branch);
+            if (auto ok = store({lattice_.deepest_level, x, band.band}, record, !record.branch); !ok) return ok;
         }
         return {};
     }
@@ -472,7 +460,7 @@ private:
 
     // --- coarser tiles ---
 
-    void finish_coarser(int level, LevelBand& band) {
+    Result<void> finish_coarser(int level, LevelBand& band) {
         records_.clear();
         records_.resize(static_cast<std::size_t>(band.columns));
         const std::int64_t chunk = tiles_at_once(n_), chunks = (band.columns + chunk - 1) / chunk;
@@ -483,8 +471,9 @@ private:
         });
         for (std::int64_t x = 0; x < band.columns; ++x)
             if (TileRecord& record = records_[static_cast<std::size_t>(x)]; record.exists)
-                keep({level, x, band.band}, record, false);
+                if (auto ok = store({level, x, band.band}, record, false); !ok) return ok;
         band.start_next(m_);
+        return {};
     }
 
     void make_coarser(const LevelBand& band, std::int64_t column, TileRecord& record) const {
@@ -507,8 +496,7 @@ private:
 
     // --- finished tiles ---
 
-    void keep(TileId id, TileRecord& record, bool leaf) {
-        result_.tiles.insert(id);
+    Result<void> store(TileId id, TileRecord& record, bool leaf) {
         if (leaf) result_.coarsest_leaf_level = std::min(result_.coarsest_leaf_level, id.level);
         if (id.level > 0) {
             ParentRecord& parent = parent_of(id, id.level - 1);
@@ -517,21 +505,15 @@ private:
             if (leaf && branches_) parent.leaf_mask = static_cast<std::uint8_t>(parent.leaf_mask | (1 << q));
             parent.children[static_cast<std::size_t>(q)] = record.bounds;
         }
-        waiting_.push_back({id, std::move(record.payload)});
+        return put(id, std::move(record.payload));
     }
 
-    Result<void> store(const std::vector<WaitingTile>& tiles) {
-        const StageClock::Scope clock(Stage::store);
-        for (const WaitingTile& tile : tiles)
-            if (auto ok = put(tile.id, tile.payload); !ok) return ok;
-        return {};
-    }
-
-    Result<void> put(TileId id, const std::vector<std::uint8_t>& payload) {
-        const std::lock_guard lock(writing_);
-        ++result_.tile_count;
+    // Any thread.
+    Result<void> put(TileId id, std::vector<std::uint8_t> payload) {
+        ++tile_count_;
+        if (job_.index != nullptr) job_.index->note(id, payload);
         return job_.writer->put(TileKind::height, *tile_key(lattice_, id), static_cast<int>(HeightCodec::plane),
-                                payload);
+                                std::move(payload));
     }
 
     const HeightPyramidJob& job_;
@@ -543,11 +525,10 @@ private:
     std::vector<LevelBand> levels_;
     std::vector<std::uint8_t> valid_;  // (m + 1) rows of the deepest band
     std::vector<TileRecord> records_;  // of the band that is being made
-    std::vector<WaitingTile> waiting_;
-    QuantizedRange range_;  // over valid samples
+    QuantizedRange range_;             // over valid samples
     HeightPyramidResult result_;
     std::optional<DeepBranches> branches_;
-    std::mutex writing_;
+    std::atomic<std::int64_t> tile_count_{0};
     std::mutex drafts_mutex_;
     std::vector<std::vector<TileDraft>> idle_drafts_;
 };
@@ -559,10 +540,9 @@ std::int64_t height_pyramid_bytes(const Lattice& lattice) {
     const std::int64_t width = lattice.cells_x + 2 * m;
     const std::int64_t bands = 2 * (m + 1) * width * 4 + (m + 1) * width;
     const std::int64_t corners = (lattice.cells_x / m + 2) * (lattice.cells_y / m + 2) * 4;
-    // Payloads of two bands of every level: one is made while the other is stored.
     const std::int64_t payload = 2 * (m + 1) * (m + 1) + 512;
     const std::int64_t records =
-        2 * (width / m) * (static_cast<std::int64_t>(sizeof(TileRecord) + sizeof(ParentRecord)) + 2 * payload);
+        width / m * (static_cast<std::int64_t>(sizeof(TileRecord) + 2 * sizeof(ParentRecord)) + payload);
     // A thread's rows and drafts.
     const std::int64_t threads = std::max(1u, std::thread::hardware_concurrency());
     const std::int64_t drafts =
