@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <zstd.h>
 
+#include <array>
 #include <bit>
 #include <cassert>
 #include <cmath>
@@ -105,25 +106,30 @@ Result<void> read_presence(ByteReader& in, std::size_t cells, std::vector<std::u
 // the row above. Sums wrap, and cannot wrap back into range unseen: in raster order the first height out of range is
 // less than 2^31 + 2^25 away. False: there is one.
 bool undo_prediction(std::span<const std::uint8_t> plain, int planes, int pitch, std::span<std::int32_t> samples) {
+    constexpr std::uint32_t kRange = 2u * kMaxHeightUnits;
     const std::size_t count = samples.size(), row = static_cast<std::size_t>(pitch);
-    thread_local std::vector<std::uint32_t> values;
-    values.resize(count);
-    for (std::size_t k = 0; k < count; ++k) values[k] = plain[k];
-    for (std::size_t p = 1; p < static_cast<std::size_t>(planes); ++p)
-        for (std::size_t k = 0; k < count; ++k) values[k] |= std::uint32_t{plain[p * count + k]} << (8 * p);
-    for (std::size_t k = 0; k < count; ++k) values[k] = static_cast<std::uint32_t>(unzigzag(values[k]));
+    const std::uint8_t* from = plain.data();
+    std::int32_t* to = samples.data();
+    std::uint32_t outside = 0;  // has a bit above kRange's where a height is out of range
+    std::array<std::uint32_t, (1 << kMaxTileCellsLog2) + 1> values, above{};
     for (std::size_t start = 0; start < count; start += row) {
+        for (std::size_t k = 0; k < row; ++k) values[k] = from[start + k];
+        for (std::size_t p = 1; p < static_cast<std::size_t>(planes); ++p) {
+            const std::uint8_t* bytes = from + p * count + start;
+            const auto shift = static_cast<unsigned>(8 * p);
+            for (std::size_t k = 0; k < row; ++k) values[k] |= std::uint32_t{bytes[k]} << shift;
+        }
+        for (std::size_t k = 0; k < row; ++k) values[k] = static_cast<std::uint32_t>(unzigzag(values[k]));
         std::uint32_t sum = 0;
-        for (std::size_t k = start; k < start + row; ++k) values[k] = sum += values[k];
-        if (start == 0) continue;
-        for (std::size_t k = start; k < start + row; ++k) values[k] += values[k - row];
+        for (std::size_t k = 0; k < row; ++k) values[k] = sum += values[k];
+        for (std::size_t k = 0; k < row; ++k) {
+            above[k] += values[k];
+            const std::uint32_t height = above[k] + kMaxHeightUnits;
+            outside |= height | (kRange - height);
+            to[start + k] = static_cast<std::int32_t>(above[k]);
+        }
     }
-    bool good = true;
-    for (std::size_t k = 0; k < count; ++k) {
-        samples[k] = static_cast<std::int32_t>(values[k]);
-        good &= values[k] + kMaxHeightUnits <= 2u * kMaxHeightUnits;
-    }
-    return good;
+    return outside >> std::bit_width(kRange) == 0;
 }
 
 }  // namespace

@@ -80,14 +80,17 @@ int main(int argc, char** argv) {
         must(choose_quantizer({plan.integer_heights, units.scale, units.offset_m, options.height_quantum_m,
                                summary.min_raw, summary.max_raw}));
     const Clock tiles;
-    TileWriter rows(*writer);
-    HeightPyramidJob job;
-    job.spool = spool.get();
-    job.writer = &rows;
-    job.lattice = lattice;
-    job.quantizer = quantizer;
-    const HeightPyramidResult heights = must(build_height_pyramid(job));
-    must(rows.flush());
+    HeightPyramidResult heights;
+    {
+        TileWriter rows(*writer);
+        HeightPyramidJob job;
+        job.spool = spool.get();
+        job.writer = &rows;
+        job.lattice = lattice;
+        job.quantizer = quantizer;
+        heights = must(build_height_pyramid(job));
+        must(rows.checkpoint("{}"));
+    }
     report("tiles", tiles);
     writer.reset();
     report("all", all, decoder_s);

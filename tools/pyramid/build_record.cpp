@@ -124,6 +124,12 @@ const std::map<std::string, Setter>& setters() {
              o.colours.nodata = parse_number(text);
              return o.colours.nodata.has_value();
          }},
+        {"texture-quality",
+         [](const std::string& text, BuildOptions& o) {
+             if (text != "high") return false;
+             o.texture_quality = TextureQuality::high;
+             return true;
+         }},
         {"tile-size", size(&BuildOptions::tile_size)},
         {"texture-size", size(&BuildOptions::texture_size)},
     };
@@ -167,6 +173,7 @@ std::map<std::string, std::string> options_record(const BuildOptions& o, const s
         record["stretch"] =
             fmt::format("{}{},{}", stretch->spares_8bit ? kChosen : "", stretch->low, stretch->high);
     number("imagery-nodata", o.colours.nodata);
+    if (o.texture_quality == TextureQuality::high) record["texture-quality"] = "high";
     if (o.tile_size != plain.tile_size) record["tile-size"] = fmt::format("{}", o.tile_size);
     if (o.texture_size != plain.texture_size) record["texture-size"] = fmt::format("{}", o.texture_size);
     return record;

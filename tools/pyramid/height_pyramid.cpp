@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <mutex>
 #include <optional>
 #include <thread>
 
@@ -119,19 +120,17 @@ public:
         }
         valid_.resize(static_cast<std::size_t>((m_ + 1) * width_));
         if (job.deep_tree != nullptr)
-            branches_.emplace(job.finest, *job.deep_tree, *job.deep_heights,
-                              [this](TileId id, std::vector<std::uint8_t> payload) { return put(id, std::move(payload)); });
+            branches_.emplace(
+                job.finest, *job.deep_tree, *job.deep_heights,
+                [this](TileId id, std::vector<std::uint8_t> payload) { return put(id, std::move(payload)); });
     }
 
     Result<HeightPyramidResult> run() {
         if (auto ok = gather_corners(); !ok) return ok.error();
         const std::int64_t bands = (lattice_.cells_y + m_ - 1) / m_;
-        for (std::int64_t band = 0; band < bands; ++band) {
+        for (std::int64_t band = 0; band < bands; ++band)
             if (auto ok = make_band(); !ok) return ok.error();
-            if (!stored_) return stored_.error();
-        }
         if (auto ok = flush(); !ok) return ok.error();
-        if (!stored_) return stored_.error();
         result_.tile_count = tile_count_;
         result_.min_n = range_.min_n;
         result_.max_n = range_.max_n;
@@ -173,7 +172,8 @@ private:
         for (int level = lattice_.deepest_level - 1; level >= 0; --level) {
             LevelBand& band = levels_[static_cast<std::size_t>(level)];
             band.rows = std::min(last / band.step - band.band * m_, m_) + 1;
-            if (band.rows > m_) finish_coarser(level, band);
+            if (band.rows <= m_) continue;
+            if (auto ok = finish_coarser(level, band); !ok) return ok;
         }
         return {};
     }
@@ -246,7 +246,7 @@ private:
             LevelBand& band = levels_[static_cast<std::size_t>(level)];
             if (band.band * lattice_.tile_extent(level) >= lattice_.cells_y) continue;
             repeat_to_end(band);
-            finish_coarser(level, band);
+            if (auto ok = finish_coarser(level, band); !ok) return ok;
         }
         return {};
     }
@@ -279,7 +279,7 @@ private:
                 range_.include({record.branch->min_n, record.branch->max_n, record.branch->worst_quantum_error_m});
             }
             result_.present_cells += record.present_cells;
-            keep({lattice_.deepest_level, x, band.band}, record, !record.branch);
+            if (auto ok = store({lattice_.deepest_level, x, band.band}, record, !record.branch); !ok) return ok;
         }
         return {};
     }
@@ -460,7 +460,7 @@ private:
 
     // --- coarser tiles ---
 
-    void finish_coarser(int level, LevelBand& band) {
+    Result<void> finish_coarser(int level, LevelBand& band) {
         records_.clear();
         records_.resize(static_cast<std::size_t>(band.columns));
         const std::int64_t chunk = tiles_at_once(n_), chunks = (band.columns + chunk - 1) / chunk;
@@ -471,8 +471,9 @@ private:
         });
         for (std::int64_t x = 0; x < band.columns; ++x)
             if (TileRecord& record = records_[static_cast<std::size_t>(x)]; record.exists)
-                keep({level, x, band.band}, record, false);
+                if (auto ok = store({level, x, band.band}, record, false); !ok) return ok;
         band.start_next(m_);
+        return {};
     }
 
     void make_coarser(const LevelBand& band, std::int64_t column, TileRecord& record) const {
@@ -495,7 +496,7 @@ private:
 
     // --- finished tiles ---
 
-    void keep(TileId id, TileRecord& record, bool leaf) {
+    Result<void> store(TileId id, TileRecord& record, bool leaf) {
         if (leaf) result_.coarsest_leaf_level = std::min(result_.coarsest_leaf_level, id.level);
         if (id.level > 0) {
             ParentRecord& parent = parent_of(id, id.level - 1);
@@ -504,7 +505,7 @@ private:
             if (leaf && branches_) parent.leaf_mask = static_cast<std::uint8_t>(parent.leaf_mask | (1 << q));
             parent.children[static_cast<std::size_t>(q)] = record.bounds;
         }
-        if (stored_) stored_ = put(id, std::move(record.payload));
+        return put(id, std::move(record.payload));
     }
 
     // Any thread.
@@ -524,8 +525,7 @@ private:
     std::vector<LevelBand> levels_;
     std::vector<std::uint8_t> valid_;  // (m + 1) rows of the deepest band
     std::vector<TileRecord> records_;  // of the band that is being made
-    Result<void> stored_;  // of the tiles put so far
-    QuantizedRange range_;  // over valid samples
+    QuantizedRange range_;             // over valid samples
     HeightPyramidResult result_;
     std::optional<DeepBranches> branches_;
     std::atomic<std::int64_t> tile_count_{0};
@@ -540,10 +540,9 @@ std::int64_t height_pyramid_bytes(const Lattice& lattice) {
     const std::int64_t width = lattice.cells_x + 2 * m;
     const std::int64_t bands = 2 * (m + 1) * width * 4 + (m + 1) * width;
     const std::int64_t corners = (lattice.cells_x / m + 2) * (lattice.cells_y / m + 2) * 4;
-    // Payloads of two bands of every level: one is made while the other is stored.
     const std::int64_t payload = 2 * (m + 1) * (m + 1) + 512;
     const std::int64_t records =
-        2 * (width / m) * (static_cast<std::int64_t>(sizeof(TileRecord) + sizeof(ParentRecord)) + 2 * payload);
+        width / m * (static_cast<std::int64_t>(sizeof(TileRecord) + 2 * sizeof(ParentRecord)) + payload);
     // A thread's rows and drafts.
     const std::int64_t threads = std::max(1u, std::thread::hardware_concurrency());
     const std::int64_t drafts =

@@ -23,8 +23,7 @@ bool fits(const HeightQuantizer& q, double low_m, double high_m) {
 // nearbyint does.
 constexpr double kRounder = 6755399441055744.0;  // 1.5 * 2^52
 
-// The same steps as HeightQuantizer::quantize and error_m, two values at a time. The clamp comes first: its ends are
-// integers, so that makes no difference.
+// The same steps as HeightQuantizer::quantize and error_m, two values at a time.
 class PairQuantizer {
 public:
     explicit PairQuantizer(const HeightQuantizer& q)
@@ -106,8 +105,9 @@ QuantizedRange HeightQuantizer::quantize(std::span<const double> raw, std::span<
 }
 
 std::int32_t HeightQuantizer::quantize(double raw) const {
-    const double n = std::nearbyint((metres(raw) - height_offset_m) / quantum_m);
-    return static_cast<std::int32_t>(std::clamp<double>(n, -kMaxHeightUnits, kMaxHeightUnits));
+    // The clamp may come before the rounding: its ends are integers.
+    const double n = std::clamp<double>((metres(raw) - height_offset_m) / quantum_m, -kMaxHeightUnits, kMaxHeightUnits);
+    return static_cast<std::int32_t>(n + kRounder - kRounder);
 }
 
 double HeightQuantizer::error_m(double raw) const {

@@ -118,6 +118,7 @@ Result<void> TextureStage::build_districts(std::int64_t first_column, std::int64
     job.first_row = first_row;
     job.columns = columns;
     job.rows = rows;
+    job.quality = job_.quality;
     job.stored = [&](TileId id) { return job_.index->stored(id); };
     job.shared_levels = job_.base.deepest_level;
     job.sink = [&](TileId id, std::vector<std::uint8_t> payload) { return sink(id, std::move(payload)); };
@@ -202,6 +203,7 @@ Result<void> TextureStage::build_crown() {
     job.lattice = job_.base;
     job.texture_size_log2 = d.texture_size_log2;
     job.deepest_level = seeds - 1;
+    job.quality = job_.quality;
     job.stored = [&](TileId id) { return job_.index->stored(id); };
     job.shared_levels = job_.base.deepest_level;
     job.children_below = [&](TileId id) {

@@ -29,6 +29,7 @@ struct TextureStageJob {
     HeightRowReader heights;
     ImageStack* imagery = nullptr;  ///< on texel_grid; null: a tint
     TileWriter* writer = nullptr;   ///< takes textures and seeds
+    TextureQuality quality = TextureQuality::normal;
     /// Finds seeds that the writer does not have (those of districts that are not built again). Null: none.
     std::function<Result<bool>(std::int64_t key, TileRow& row)> other_seeds;
     std::function<void(std::int64_t texels)> on_texels;

@@ -254,6 +254,7 @@ private:
         job.heights = [&](TileId id, TileRow& row) { return read_heights(id, row); };
         job.imagery = imagery.get();
         job.writer = writer_.get();
+        job.quality = build_.texture_quality;
         job.other_seeds = [&](std::int64_t key, TileRow& row) -> Result<bool> {
             const TileId id = *tile_from_key(dataset_.lattice, key);
             if (dirty_.at(static_cast<std::size_t>(id.y * columns_ + id.x)) != 0) return false;  // it has none now

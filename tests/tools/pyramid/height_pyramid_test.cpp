@@ -15,7 +15,8 @@ namespace {
 
 constexpr double kVoid = std::numeric_limits<double>::quiet_NaN();
 
-HeightPyramidJob job_of(HeightSpool& spool, TileWriter& writer, const Lattice& lattice, const HeightQuantizer& quantizer) {
+HeightPyramidJob job_of(HeightSpool& spool, TileWriter& writer, const Lattice& lattice,
+                        const HeightQuantizer& quantizer) {
     HeightPyramidJob job;
     job.spool = &spool;
     job.writer = &writer;
@@ -239,6 +240,15 @@ TEST(HeightPyramid, SmallTerrainsEqualBruteForceTileByTile) {
                      ", voids " + std::to_string(voids) + " %");
         BuiltPyramid(width, height, n, voids, random).check();
     }
+}
+
+// More tiles than a thread takes at once, several levels over each.
+TEST(HeightPyramid, WideTerrainsEqualBruteForceToo) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed() + 2);
+    BuiltPyramid(300, 70, 3, 0, random).check();
+    BuiltPyramid(300, 70, 3, 40, random).check();
+    BuiltPyramid(150, 20, 2, 10, random).check();
 }
 
 TEST(HeightPyramid, ThinTerrainsHaveManyRoots) {
