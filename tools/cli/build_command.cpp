@@ -10,6 +10,7 @@
 #include "common/report.h"
 #include "tools/cli/dataset_label.h"
 #include "tools/cli/height_options.h"
+#include "tools/pyramid/build_record.h"
 #include "tools/pyramid/builder.h"
 #include "tools/source/number_text.h"
 
@@ -18,15 +19,6 @@ namespace {
 
 const std::map<std::string, Kernel> kKernels = {
     {"nearest", Kernel::nearest}, {"bilinear", Kernel::bilinear}, {"cubic", Kernel::cubic}};
-
-Result<FillRule> parse_fill(const std::string& text) {
-    if (text == "smooth") return FillRule{FillRule::Kind::smooth};
-    if (text == "none") return FillRule{FillRule::Kind::none};
-    const auto height = parse_number(text);
-    if (!height || !(std::abs(*height) <= 1e7))
-        return Error{ErrorCode::usage, fmt::format("--fill {} is not smooth, none or a height within 1e7 m", text)};
-    return FillRule{FillRule::Kind::value, *height};
-}
 
 void print_plan(const BuildPlan& plan) {
     const Dataset& d = plan.dataset;
@@ -37,6 +29,7 @@ void print_plan(const BuildPlan& plan) {
     const MosaicPlan& m = plan.mosaic;
     if (!m.crs_reason.empty()) note("CRS: {}\n", m.crs_reason);
     if (!m.heights_copied) note("heights are resampled: their samples are no square grid of {}\n", crs_label(d));
+    for (const std::string& conversion : m.conversions) note("{}\n", conversion);
     for (const std::string& warning : m.warnings) note("warning: {}\n", warning);
     note("textures: {} levels, {} m a texel; memory: about {} MiB\n", d.texture_deepest_level + 1,
          d.texel_m(d.texture_deepest_level), plan.memory_bytes >> 20);
@@ -120,6 +113,8 @@ int run_build(int argc, char** argv) {
     if (!options.quiet)
         for (const std::string& line : report->notes) note("{}\n", line);
     if (!options.quiet)
+        if (report->reused_tiles > 0) note("{} tiles were there from before\n", report->reused_tiles);
+    if (!options.quiet)
         note("{}: {:.1f} MB, {} height tiles, {} texture tiles; {:.1f} s, {:.1f} CPU s, peak {} MiB\n", options.out,
              static_cast<double>(report->store_bytes) / 1e6, report->height_tiles, report->texture_tiles,
              report->seconds, report->cpu_seconds, report->peak_rss_bytes >> 20);
@@ -127,6 +122,7 @@ int run_build(int argc, char** argv) {
         note("resampling moved heights by {:.3f} m at most, {:.3f} m root mean square\n", report->warp_error_m,
              report->warp_rms_m);
     if (json.empty()) return 0;
+    const auto stage = [&](Stage s) { return report->stage_seconds[static_cast<std::size_t>(s)]; };
     const nlohmann::ordered_json out = {{"seconds", report->seconds},
                                         {"cpu_seconds", report->cpu_seconds},
                                         {"peak_rss_bytes", report->peak_rss_bytes},
@@ -137,7 +133,14 @@ int run_build(int argc, char** argv) {
                                         {"warp_rms_m", report->warp_rms_m},
                                         {"height_tiles", report->height_tiles},
                                         {"texture_tiles", report->texture_tiles},
-                                        {"store_bytes", report->store_bytes}};
+                                        {"store_bytes", report->store_bytes},
+                                        {"reused_tiles", report->reused_tiles},
+                                        {"decode_seconds", stage(Stage::decode)},
+                                        {"warp_seconds", stage(Stage::warp)},
+                                        {"filter_seconds", stage(Stage::filter)},
+                                        {"encode_seconds", stage(Stage::encode)},
+                                        {"error_seconds", stage(Stage::error)},
+                                        {"store_seconds", stage(Stage::store)}};
     if (auto ok = write_text(json, out.dump(2) + "\n"); !ok) return report_error("scree build", ok.error());
     return 0;
 }

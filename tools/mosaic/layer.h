@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,12 @@
 
 namespace scree {
 
+/// Heights above one vertical reference that are to stand above another (VerticalCrs::parse).
+struct DatumChange {
+    std::string from, to;
+    LonLatBox area;  ///< of all heights: what the operation is chosen for
+};
+
 /// A file whose header has been read and whose place is known. Longitudes are within 180 degrees of the mosaic's first
 /// file's middle.
 struct PlacedFile {
@@ -19,6 +26,7 @@ struct PlacedFile {
     ImageInfo info;
     Georeference where;
     Crs crs;
+    std::optional<DatumChange> datum_change = std::nullopt;  ///< of heights
 };
 
 struct LayerMember {
@@ -43,6 +51,9 @@ struct PlaneBox {
     double west = 0, south = 0, east = 0, north = 0;
 };
 Result<PlaneBox> box_of(const PlacedFile& file, const Crs& to);
+
+/// ErrorCode::input where a file that is opened again is not what it was.
+Result<void> check_unchanged(const PlacedFile& file, const ImageInfo& now);
 
 /// Brings the file's longitudes within 180 degrees of `longitude`; nothing for a projected CRS.
 void turn_towards(double longitude, PlacedFile& file);

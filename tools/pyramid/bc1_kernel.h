@@ -21,13 +21,20 @@ Bc1Kernel bc1_kernel_sse2;
 Bc1Kernel bc1_kernel_avx2;
 Bc1Kernel bc1_kernel_avx512;  // AVX-512 F and BW
 
+bool bc1_kernel_avx512_runs_here();
+
 /// The fastest kernel that this processor runs.
 Bc1Kernel* best_bc1_kernel();
 
 /// encode_bc1_row with the kernel given: whole groups directly, the rest through a padded copy.
 void encode_bc1_row_with(Bc1Kernel* kernel, const uint8_t* rgba, size_t row_bytes, size_t block_count, uint8_t* out);
 
-/// A block that has transparent texels, or that one colour represents best (its rounded mean). 8 bytes to `out`.
-void encode_bc1_special_block(const uint8_t* rgba, size_t row_bytes, uint8_t* out);
+inline constexpr uint8_t kBc1Transparent[8] = {0, 0, 0, 0, 0xFF, 0xFF, 0xFF, 0xFF};
+
+/// An opaque block of one colour (R, G, B in levels), as near to it as BC1 comes. 8 bytes to `out`.
+void encode_bc1_solid_block(const int colour[3], uint8_t* out);
+
+/// A block whose opaque texels their rounded mean represents best, some of them or all transparent. 8 bytes to `out`.
+void encode_bc1_plain_block(const uint8_t* rgba, size_t row_bytes, uint8_t* out);
 
 }  // namespace scree

@@ -42,9 +42,8 @@ struct BuildPlan {
 
     MosaicPlan mosaic;
     OpenOptions open;  ///< how files are opened
-    /// One file whose rows are the lattice's rows: it is read straight through, without a copy on disk.
+    /// One DEM whose rows are the lattice's rows: it is read straight through, without a copy on disk.
     bool heights_in_place = false;
-    bool imagery_in_place = false;
     bool integer_heights = false;           ///< every height is an integer of the file's, nothing is resampled
     bool wide_heights = false;              ///< values do not fit float32
     Dataset dataset;                        ///< lattice, CRS, texture depth; heights still unknown
