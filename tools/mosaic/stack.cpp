@@ -121,6 +121,8 @@ public:
     std::optional<Window> window() const { return window_of(points_, layer_.spooled->layer, rule_); }
 
     Result<void> overlay(const Window& w, std::span<Value> out) {
+        // The boxes of scattered files are mostly empty.
+        if (!layer_.spooled->spool->holds_any(w.column, w.row, w.columns, w.rows)) return {};
         const auto count = static_cast<std::size_t>(w.count());
         std::vector<T> stored(count);
         if (auto ok = layer_.spooled->spool->read(w.column, w.row, w.columns, w.rows, stored); !ok) return ok;
