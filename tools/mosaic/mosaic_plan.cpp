@@ -188,26 +188,29 @@ private:
         return {};
     }
 
-    // The one that was asked for. It has to be on record unless all files name it, and then nothing is converted.
+    // The one that was asked for. It has to be on record unless files name it and none names another: then nothing is
+    // converted, and a store that was built so can be judged so.
     Result<void> adopt_datum(const std::string& asked) {
         if (request_.assume_same_datum)
             return usage_error("--vertical-crs converts heights, --assume-same-datum takes them as they are");
         plan_.vertical_datum = asked;
         std::string unnamed;
-        bool all_named = true;
+        bool named = false, another = false;
         for (const PlacedFile& f : plan_.heights) {
-            all_named = all_named && datum_of(f) == asked;
-            if (datum_of(f).empty() && unnamed.empty()) unnamed = f.path;
+            const std::string datum = datum_of(f);
+            if (datum.empty() && unnamed.empty()) unnamed = f.path;
+            named = named || datum == asked;
+            another = another || (!datum.empty() && datum != asked);
         }
-        if (all_named) return {};
+        if (!unnamed.empty())
+            plan_.warnings.push_back(
+                fmt::format("{} names no vertical datum; its heights are taken to be above {}", unnamed, asked));
+        if (named && !another) return {};
         auto target = VerticalCrs::parse(asked);
         if (!target) return usage_error(fmt::format("--vertical-crs {}", target.error().message));
         if (!target->up || std::abs(target->metres_per_unit - 1) > 1e-9)
             return usage_error(fmt::format("--vertical-crs {}: {} does not count metres upwards, and terrain does",
                                            asked, target->name));
-        if (!unnamed.empty())
-            plan_.warnings.push_back(
-                fmt::format("{} names no vertical datum; its heights are taken to be above {}", unnamed, asked));
         return {};
     }
 

@@ -77,6 +77,8 @@ public:
     std::optional<SampleRectangle> window() const { return source_window(points_, layer_.spooled->layer, rule_); }
 
     Result<void> overlay(const SampleRectangle& w, std::span<double> out) {
+        // The boxes of scattered files are mostly empty.
+        if (!layer_.spooled->spool->holds_any(w.column, w.row, w.columns, w.rows)) return {};
         const auto count = static_cast<std::size_t>(w.count());
         std::vector<T> stored(count);
         if (auto ok = layer_.spooled->spool->read(w.column, w.row, w.columns, w.rows, stored); !ok) return ok;

@@ -171,6 +171,16 @@ TEST(HeightShift, RefusesWhatItCannotDo) {
     expect_refused(both_ways, ErrorCode::usage, {"--vertical-crs", "--assume-same-datum"});
 }
 
+// A store of such files names it, and is judged by it.
+TEST(HeightShift, LeavesAloneWhatFilesSayThatNoRegistryKnows) {
+    const test::TemporaryFolder folder;
+    const std::string odd = write_heights(folder.file("a.tif"), 5129);
+    const auto plan = plan_mosaic(request_for({odd, write_heights(folder.file("b.tif"), 0)}, "EPSG:5129"));
+    ASSERT_TRUE(plan) << plan.error().message;
+    EXPECT_EQ(plan->vertical_datum, "EPSG:5129");
+    EXPECT_TRUE(plan->same_units);
+}
+
 TEST(HeightShift, TakesFilesThatNameNoDatumAsTheyAreAndSaysSo) {
     const test::TemporaryFolder folder;
     const auto plan = plan_mosaic(request_for({write_heights(folder.file("a.tif"), 0)}, "EPSG:5773"));
