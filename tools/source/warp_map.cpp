@@ -1,5 +1,7 @@
 #include "tools/source/warp_map.h"
 
+#include <emmintrin.h>
+
 #include <algorithm>
 #include <array>
 #include <cassert>
@@ -207,6 +209,18 @@ Worker::Fit Worker::judge(const Cell& cell) const {
     return cell.size <= 4 ? Fit::every_point : Fit::divide;
 }
 
+/// out[i] = start + slope * ((i + first) * step), two at a time.
+void fill_line(double start, double slope, int first, double step, int count, double* out) {
+    const __m128d starts = _mm_set1_pd(start), slopes = _mm_set1_pd(slope), steps = _mm_set1_pd(step);
+    __m128d at = _mm_set_pd(first + 1, first);
+    int i = 0;
+    for (; i + 2 <= count; i += 2) {
+        _mm_storeu_pd(out + i, _mm_add_pd(starts, _mm_mul_pd(slopes, _mm_mul_pd(at, steps))));
+        at = _mm_add_pd(at, _mm_set1_pd(2));
+    }
+    if (i < count) out[i] = start + slope * ((i + first) * step);
+}
+
 void Worker::fill(const Cell& cell, const Request& request) const {
     const int far_i = cell.i + cell.size, far_j = cell.j + cell.size;
     const Patch patch{at(cell.i, cell.j), at(far_i, cell.j), at(cell.i, far_j), at(far_i, far_j)};
@@ -217,11 +231,8 @@ void Worker::fill(const Cell& cell, const Request& request) const {
         const double columns = right.column - left.column, rows = right.row - left.row;
         double* const column = &request.out.column[request.index(first, j)];
         double* const row = &request.out.row[request.index(first, j)];
-        for (int i = 0; i < last - first; ++i) {
-            const double s = (i + first - cell.i) * step;
-            column[i] = left.column + columns * s;
-            row[i] = left.row + rows * s;
-        }
+        fill_line(left.column, columns, first - cell.i, step, last - first, column);
+        fill_line(left.row, rows, first - cell.i, step, last - first, row);
     }
 }
 
