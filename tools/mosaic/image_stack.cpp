@@ -71,11 +71,10 @@ struct MappedLines {
     }
 };
 
-std::optional<SampleRectangle> window_of_lines(const LayerOnGrid& layer, const Area& area) {
-    // The outermost points stand for all of them.
-    const MappedLines lines(layer, area);
-    std::vector<double> column{lines.column.front(), lines.column.back()}, row{lines.row.front(), lines.row.back()};
-    return source_window({column, row}, layer.layer, layer.rule_at(area.i, area.j));
+std::optional<SampleRectangle> window_of(const LayerOnGrid& layer, const Area& area) {
+    const auto bounds = layer.map.bounds(area.i, area.j, area.columns, area.rows);
+    if (!bounds) return std::nullopt;
+    return source_window(*bounds, layer.layer, layer.rule_at(area.i, area.j));
 }
 
 template <class Use>
@@ -94,15 +93,11 @@ void for_each_chunk(const Area& area, Use&& use) {
 
 void want(LayerOnGrid& layer, const Area& area) {
     const std::int64_t until = area.j + area.rows;
-    if (layer.lattice) {
-        if (const auto window = window_of_lines(layer, area)) layer.pixels->want(*window, until);
-        return;
-    }
-    for_each_chunk(area, [&](const Area& chunk) {
-        MappedPoints mapped(layer, chunk);
-        const auto window = source_window(mapped.points(), layer.layer, layer.rule_at(chunk.i, chunk.j));
-        if (window) layer.pixels->want(*window, until);
-    });
+    const auto want_part = [&](const Area& part) {
+        if (const auto window = window_of(layer, part)) layer.pixels->want(*window, until);
+    };
+    if (layer.lattice) return want_part(area);
+    for_each_chunk(area, want_part);
 }
 
 // --- sampling ---
@@ -177,7 +172,7 @@ private:
             if (columns && rows) return copy(*columns, *rows, area, out);
         }
         const ResampleRule rule = layer_.rule_at(area.i, area.j);
-        return resample(area, window_of_lines(layer_, area), out, [&](const auto& window, auto fresh) {
+        return resample(area, window_of(layer_, area), out, [&](const auto& window, auto fresh) {
             resample_colour_lines(window, {lines.column, lines.row}, rule, fresh);
         });
     }
@@ -248,7 +243,7 @@ Result<void> sample_piece(const std::vector<LayerOnGrid>& layers, const Area& ar
                           Scratch& scratch) {
     bool empty = true;
     for (auto layer = layers.rbegin(); layer != layers.rend(); ++layer) {
-        if (layer->lattice && !window_of_lines(*layer, area)) continue;
+        if (layer->lattice && !window_of(*layer, area)) continue;
         if (empty) {
             if (auto ok = LayerSampler(*layer, scratch).sample(area, out); !ok) return ok;
             empty = false;

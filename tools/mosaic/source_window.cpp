@@ -41,7 +41,13 @@ Range range_of(std::span<const double> values) {
 }  // namespace
 
 std::optional<SampleRectangle> source_window(const SourcePoints& points, const Layer& layer, const ResampleRule& rule) {
-    Range across = range_of(points.column), down = range_of(points.row);
+    const Range across = range_of(points.column), down = range_of(points.row);
+    return source_window({across.low, across.high, down.low, down.high}, layer, rule);
+}
+
+std::optional<SampleRectangle> source_window(const WarpMap::Bounds& bounds, const Layer& layer,
+                                             const ResampleRule& rule) {
+    Range across{bounds.west, bounds.east}, down{bounds.north, bounds.south};
     across.clip(-1, static_cast<double>(layer.columns));
     down.clip(-1, static_cast<double>(layer.rows));
     if (!(across.low <= across.high && down.low <= down.high)) return std::nullopt;

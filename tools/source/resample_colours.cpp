@@ -289,65 +289,58 @@ bool four_bilinear(const std::uint32_t* above, std::int64_t pitch, Offset offset
     const __m128i w11 = _mm_srli_epi32(_mm_add_epi32(_mm_madd_epi16(across, down), half), kBilinearBits);
     const __m128i w10 = _mm_sub_epi32(across, w11), w01 = _mm_sub_epi32(down, w11);
     const __m128i w00 = _mm_sub_epi32(_mm_sub_epi32(one, across), w01);
-    const __m128i upper = _mm_or_si128(w00, _mm_slli_epi32(w10, 16)),
-                  lower = _mm_or_si128(w01, _mm_slli_epi32(w11, 16));
+    const __m128i left = _mm_or_si128(w00, _mm_slli_epi32(w01, 16)), right = _mm_or_si128(w10, _mm_slli_epi32(w11, 16));
     __m128i both = _mm_set1_epi32(-1);
-    const auto point = [&](std::size_t n, __m128i upper_weights, __m128i lower_weights) {
+    const auto point = [&](std::size_t n, __m128i left_weights, __m128i right_weights) {
         const std::uint32_t* at = above + offset(n);
-        const __m128i upper_two = two_pixels(at), lower_two = two_pixels(at + pitch);
-        both = _mm_and_si128(both, _mm_and_si128(upper_two, lower_two));
-        const __m128i sum = _mm_add_epi32(_mm_madd_epi16(paired(upper_two), upper_weights),
-                                          _mm_madd_epi16(paired(lower_two), lower_weights));
+        const __m128i upper = two_pixels(at), lower = two_pixels(at + pitch), zero = _mm_setzero_si128();
+        both = _mm_and_si128(both, _mm_and_si128(upper, lower));
+        // The channels of one above and one below side by side, of the left two, then of the right two.
+        const __m128i four = _mm_unpacklo_epi8(upper, lower);
+        const __m128i sum = _mm_add_epi32(_mm_madd_epi16(_mm_unpacklo_epi8(four, zero), left_weights),
+                                          _mm_madd_epi16(_mm_unpackhi_epi8(four, zero), right_weights));
         return _mm_srli_epi32(_mm_add_epi32(sum, half), kBilinearBits);
     };
-    const __m128i p0 = point(0, _mm_shuffle_epi32(upper, 0x00), _mm_shuffle_epi32(lower, 0x00));
-    const __m128i p1 = point(1, _mm_shuffle_epi32(upper, 0x55), _mm_shuffle_epi32(lower, 0x55));
-    const __m128i p2 = point(2, _mm_shuffle_epi32(upper, 0xAA), _mm_shuffle_epi32(lower, 0xAA));
-    const __m128i p3 = point(3, _mm_shuffle_epi32(upper, 0xFF), _mm_shuffle_epi32(lower, 0xFF));
+    const __m128i p0 = point(0, _mm_shuffle_epi32(left, 0x00), _mm_shuffle_epi32(right, 0x00));
+    const __m128i p1 = point(1, _mm_shuffle_epi32(left, 0x55), _mm_shuffle_epi32(right, 0x55));
+    const __m128i p2 = point(2, _mm_shuffle_epi32(left, 0xAA), _mm_shuffle_epi32(right, 0xAA));
+    const __m128i p3 = point(3, _mm_shuffle_epi32(left, 0xFF), _mm_shuffle_epi32(right, 0xFF));
     _mm_storeu_si128(reinterpret_cast<__m128i*>(out),
                      _mm_packus_epi16(_mm_packs_epi32(p0, p1), _mm_packs_epi32(p2, p3)));
     return all_opaque(set_upper(both));
 }
 
-/// Points one by one, along one axis of a window, four at a time.
-class FourBilinear {
+/// Points along one axis of a window, four at a time.
+class FourPlaces {
 public:
-    FourBilinear(const Axis& axis, std::int64_t window_first, std::int64_t window_count)
-        : low_(_mm_set1_pd(axis.low)),
-          high_(_mm_set1_pd(axis.high)),
-          end_(_mm_set1_pd(axis.end)),
-          base_(_mm_set1_pd(static_cast<double>(window_first * kBilinearOne))),
-          limit_(_mm_set1_pd(static_cast<double>((window_count - 1) * kBilinearOne))),
-          last_pair_(_mm_set1_epi32(static_cast<int>(std::min(axis.last_pair - window_first, window_count)))) {}
+    FourPlaces(const Axis& axis, std::int64_t window_first, std::int64_t window_count)
+        : base_(_mm_set1_pd(fine(window_first))),
+          low_(_mm_set1_pd(std::max(0.0, 0.5 - fine(window_first)))),
+          limit_(_mm_set1_pd(std::min(fine(window_count - 1), fine(axis.last - window_first)))) {}
 
     struct Places {
         __m128i sample, fraction;  ///< samples counted from the window's first
-        bool inside;               ///< all four lie in the raster, their pixels in the window
+        bool inside;               ///< all four lie between samples of the raster that the window has
     };
-    /// As bilinear_place: numbers of the window's own are exact, so they are truncated alike.
+    /// As bilinear_place: to count from the window's first sample changes no digit.
     Places operator()(const double* at) const {
         int inside = 3;
-        const __m128i fine = _mm_unpacklo_epi64(two(at, inside), two(at + 2, inside));
-        const __m128i beyond = _mm_cmpgt_epi32(_mm_srli_epi32(fine, kBilinearBits), last_pair_);
-        const __m128i sample = _mm_or_si128(_mm_and_si128(beyond, last_pair_),
-                                            _mm_andnot_si128(beyond, _mm_srli_epi32(fine, kBilinearBits)));
-        return {sample, _mm_sub_epi32(fine, _mm_slli_epi32(sample, kBilinearBits)), inside == 3};
+        const __m128i places = _mm_unpacklo_epi64(two(at, inside), two(at + 2, inside));
+        return {_mm_srli_epi32(places, kBilinearBits),
+                _mm_and_si128(places, _mm_set1_epi32(static_cast<int>(kBilinearOne - 1))), inside == 3};
     }
 
 private:
+    static double fine(std::int64_t sample) { return static_cast<double>(sample * kBilinearOne); }
     __m128i two(const double* at, int& inside) const {
-        const __m128d u = _mm_loadu_pd(at);
-        const __m128d on = _mm_min_pd(_mm_max_pd(u, _mm_setzero_pd()), end_);
         const __m128d one = _mm_set1_pd(static_cast<double>(kBilinearOne));
-        const __m128d fine = _mm_sub_pd(_mm_add_pd(_mm_mul_pd(on, one), _mm_set1_pd(0.5)), base_);
-        const __m128d held = _mm_and_pd(_mm_cmpge_pd(u, low_), _mm_cmple_pd(u, high_));
-        const __m128d there = _mm_and_pd(_mm_cmpge_pd(fine, _mm_setzero_pd()), _mm_cmplt_pd(fine, limit_));
-        inside &= _mm_movemask_pd(_mm_and_pd(held, there));
-        return _mm_cvttpd_epi32(fine);
+        const __m128d scaled = _mm_add_pd(_mm_mul_pd(_mm_loadu_pd(at), one), _mm_set1_pd(0.5));
+        const __m128d place = _mm_sub_pd(scaled, base_);
+        inside &= _mm_movemask_pd(_mm_and_pd(_mm_cmpge_pd(place, low_), _mm_cmplt_pd(place, limit_)));
+        return _mm_cvttpd_epi32(place);
     }
 
-    __m128d low_, high_, end_, base_, limit_;
-    __m128i last_pair_;
+    __m128d base_, low_, limit_;
 };
 
 /// Windows whose places in 2^-12 samples fit 31 bits, and rasters that have pairs.
@@ -359,7 +352,7 @@ bool fits_fours(const ColourSampler& sampler, const SampleWindow<std::uint32_t>&
 
 void bilinear_points(ColourSampler& sampler, const SampleWindow<std::uint32_t>& window, const SourcePoints& points,
                      std::span<std::uint32_t> out) {
-    const FourBilinear columns(sampler.columns(), window.first_column, window.columns),
+    const FourPlaces columns(sampler.columns(), window.first_column, window.columns),
         rows(sampler.rows(), window.first_row, window.rows);
     const std::uint32_t* pixels = window.values.data();
     std::size_t k = 0;
