@@ -92,6 +92,18 @@ std::int64_t floor_to_chunk(std::int64_t i) {
     return i - (rest < 0 ? rest + WarpMap::kChunk : rest);
 }
 
+/// out[i] = start + slope * ((first + i) * step), two at a time.
+void fill_line(double start, double slope, double first, double step, std::int64_t count, double* out) {
+    const __m128d starts = _mm_set1_pd(start), slopes = _mm_set1_pd(slope), steps = _mm_set1_pd(step);
+    __m128d at = _mm_set_pd(first + 1, first);
+    std::int64_t i = 0;
+    for (; i + 2 <= count; i += 2) {
+        _mm_storeu_pd(out + i, _mm_add_pd(starts, _mm_mul_pd(slopes, _mm_mul_pd(at, steps))));
+        at = _mm_add_pd(at, _mm_set1_pd(2));
+    }
+    if (i < count) out[i] = start + slope * ((first + static_cast<double>(i)) * step);
+}
+
 /// A square of a chunk; it stands for the points [i, i + size) x [j, j + size) and has corners on all four sides.
 struct Cell {
     int i, j, size;
@@ -212,18 +224,6 @@ Worker::Fit Worker::judge(const Cell& cell) const {
     if (fits) return Fit::interpolate;
     // Below four points a side nearly all are known.
     return cell.size <= 4 ? Fit::every_point : Fit::divide;
-}
-
-/// out[i] = start + slope * ((i + first) * step), two at a time.
-void fill_line(double start, double slope, int first, double step, int count, double* out) {
-    const __m128d starts = _mm_set1_pd(start), slopes = _mm_set1_pd(slope), steps = _mm_set1_pd(step);
-    __m128d at = _mm_set_pd(first + 1, first);
-    int i = 0;
-    for (; i + 2 <= count; i += 2) {
-        _mm_storeu_pd(out + i, _mm_add_pd(starts, _mm_mul_pd(slopes, _mm_mul_pd(at, steps))));
-        at = _mm_add_pd(at, _mm_set1_pd(2));
-    }
-    if (i < count) out[i] = start + slope * ((i + first) * step);
 }
 
 void Worker::fill(const Cell& cell, const Request& request) const {
@@ -425,10 +425,10 @@ void map_affine(const GridAffine& affine, std::int64_t i0, std::int64_t j0, std:
         const double down = static_cast<double>(j);
         const double left_column = affine.origin.column + down * affine.by_j.column;
         const double left_row = affine.origin.row + down * affine.by_j.row;
-        for (std::int64_t i = i0; i < i0 + columns; ++i) {
-            *column++ = left_column + static_cast<double>(i) * affine.by_i.column;
-            *row++ = left_row + static_cast<double>(i) * affine.by_i.row;
-        }
+        fill_line(left_column, affine.by_i.column, static_cast<double>(i0), 1, columns, column);
+        fill_line(left_row, affine.by_i.row, static_cast<double>(i0), 1, columns, row);
+        column += columns;
+        row += columns;
     }
 }
 
