@@ -372,6 +372,37 @@ TEST(OpenImagesTest, KeepTheFilesThatWereUsedLast) {
     EXPECT_EQ(changed.error().code, ErrorCode::input);
 }
 
+// Where it is only guessed which points read a row, what was wanted stays until its points are released.
+TEST_F(ImageStacks, AWrongGuessLosesNothingThatIsPrepared) {
+    SCREE_TRACE_SEED();
+    Picture picture;
+    picture.height = 300;
+    const std::vector<PlacedFile> files{placed(write(picture))};
+    OpenImages images(files, {});
+    auto spool = TemporaryFile::create(folder_.file("t"));
+    ASSERT_TRUE(spool.ok());
+    SpoolMemory memory;
+    SpooledPixels pixels(files[0], 0, **spool, 0, memory);
+    const SampleRectangle north{0, 0, 100, 128};
+    pixels.want(north, 50);
+    ASSERT_TRUE(pixels.fetch(images, {}).ok());
+    const LastReading long_ago = [](const SampleRectangle&) { return std::int64_t{-1000}; };
+    Pixels before(100 * 128), after(100 * 128);
+    ASSERT_TRUE(pixels.read(north, before.data(), 100).ok());
+    pixels.release(49, long_ago, images);
+    ASSERT_TRUE(pixels.read(north, after.data(), 100).ok());
+    EXPECT_EQ(before, after);
+    pixels.release(50, long_ago, images);
+    EXPECT_FALSE(pixels.read(north, after.data(), 100).ok());
+    EXPECT_EQ((*spool)->bytes_taken(), 0);
+    EXPECT_FALSE(images.is_open(0)) << "nothing is left to decode";
+    // What is wanted after all is decoded again.
+    pixels.want(north, 60);
+    ASSERT_TRUE(pixels.fetch(images, {}).ok());
+    ASSERT_TRUE(pixels.read(north, after.data(), 100).ok());
+    EXPECT_EQ(before, after);
+}
+
 TEST_F(ImageStacks, AReadingThatIsStoppedGoesOn) {
     Scene scene;
     scene.grid = {500000, 5300000, 10};
