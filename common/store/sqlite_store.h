@@ -70,17 +70,21 @@ class SqliteStoreWriter {
 public:
     /// A new, empty file; an existing one is emptied.
     static Result<std::unique_ptr<SqliteStoreWriter>> create(const std::string& path);
-    /// A file that was cut off, brought back to its last checkpoint. Errors: ErrorCode::store where there is none to go
-    /// back to (empty file, not ours, damaged pages, another format version).
+    /// A file that was cut off, brought back to its last checkpoint; reads all of it once. Errors: ErrorCode::store
+    /// where there is none to go back to (no file or an empty one, not ours, damaged pages, another format version, and
+    /// a complete store, which SqliteStore::open takes).
     static Result<std::unique_ptr<SqliteStoreWriter>> resume(const std::string& path);
     /// A finished store, to be changed in one transaction that finish() commits; readers go on meanwhile and see all
-    /// of it or nothing. Errors: those of SqliteStore::open; ErrorCode::usage when another process is changing it.
+    /// of it or nothing. They wait during the commit, and from the first put beyond 256 MiB of changed pages on; a
+    /// reader that does not let go for 20 s makes it fail. Without finish() nothing changes, and there are no
+    /// checkpoints. Errors: those of SqliteStore::open; ErrorCode::usage when another writer is changing it.
     static Result<std::unique_ptr<SqliteStoreWriter>> amend(const std::string& path);
     ~SqliteStoreWriter();
     SqliteStoreWriter(const SqliteStoreWriter&) = delete;
     SqliteStoreWriter& operator=(const SqliteStoreWriter&) = delete;
 
-    /// Adds a row, or replaces the one of this key.
+    /// Adds a row, or replaces the one of this key. Any order will do; subtree by subtree, and within one by key, fills
+    /// pages best.
     Result<void> put(TileKind kind, std::int64_t key, int codec, std::span<const std::uint8_t> payload);
     Result<void> remove(TileKind kind, std::int64_t key);
     /// Reads a row, committed or not. False: there is none.

@@ -33,7 +33,7 @@ Error not_resumable(const std::string& path, const std::string& why) {
 Result<void> set_up(const std::string& path, sqlite3* db, int cache_KiB) {
     return execute(path, db,
                    fmt::format("PRAGMA journal_mode=DELETE; PRAGMA synchronous=EXTRA; PRAGMA temp_store=MEMORY; "
-                               "PRAGMA secure_delete=ON; PRAGMA mmap_size=0; PRAGMA cache_size=-{};",
+                               "PRAGMA mmap_size=0; PRAGMA cache_size=-{};",
                                cache_KiB));
 }
 

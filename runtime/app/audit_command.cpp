@@ -96,6 +96,7 @@ Result<AuditResult> audit(const ViewOptions& o, const AuditOptions& a) {
     if (!a.against.empty()) {
         SamplingOptions sampling = a.sampling;
         sampling.crs = d.crs;
+        sampling.vertical_crs = d.vertical_datum;
         auto samples = sample_sources(a.against, sampling);
         if (!samples) return samples.error();
         sources = std::move(*samples);

@@ -177,7 +177,10 @@ std::vector<std::string> arguments_of(const std::vector<std::string>& sources, c
     std::vector<std::string> words{"scree", "samples", "--quiet", fmt::format("--fd={}", fd)};
     if (!o.crs.empty()) words.push_back("--crs=" + o.crs);
     if (o.assume_crs) words.push_back("--assume-crs=" + *o.assume_crs);
-    if (o.assume_same_datum) words.push_back("--assume-same-datum");
+    if (o.assume_same_datum)
+        words.push_back("--assume-same-datum");
+    else if (!o.vertical_crs.empty())
+        words.push_back("--vertical-crs=" + o.vertical_crs);
     if (o.spacing_m) words.push_back(fmt::format("--spacing={}", *o.spacing_m));
     if (o.height_scale) words.push_back(fmt::format("--height-scale={}", *o.height_scale));
     words.push_back(fmt::format("--height-offset={}", o.height_offset_m));

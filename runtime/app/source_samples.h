@@ -72,6 +72,7 @@ private:
 struct SamplingOptions {
     std::string crs;                        ///< the dataset's; empty: metres of the files' own
     std::optional<std::string> assume_crs;  ///< of files that name none
+    std::string vertical_crs;               ///< the dataset's; empty: of the files' own
     bool assume_same_datum = false;
     std::optional<double> spacing_m;     ///< for files without georeference
     std::optional<double> height_scale;  ///< z = value * scale + offset; none: as the files say

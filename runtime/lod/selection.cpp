@@ -83,8 +83,9 @@ struct Selector::Impl {
                 0};
     }
 
-    // Roots are always planned.
-    std::int64_t without_reserve(std::int64_t slots) const {
+    // Roots are always planned. Where every tile of the store has its slot nothing can be too large.
+    std::int64_t without_reserve(std::int64_t slots, std::int64_t tiles) const {
+        if (tiles > 0 && slots >= tiles) return slots;
         const std::int64_t roots = dataset.lattice.root_rows * dataset.lattice.root_columns;
         return std::max(slots - slots / kReserve, std::min(slots, roots));
     }
@@ -103,8 +104,8 @@ struct Selector::Impl {
     // The finest plan that fits: textures first, as they take most of the memory, then geometry.
     void make_plan(const SelectionSettings& all, const Residency& residency) {
         SelectionSettings s = all;
-        s.height_slots = without_reserve(s.height_slots);
-        s.texture_slots = without_reserve(s.texture_slots);
+        s.height_slots = without_reserve(s.height_slots, dataset.height_tiles);
+        s.texture_slots = without_reserve(s.texture_slots, dataset.texture_tiles);
         if (try_plan(s, residency, 0, 0)) return;
         result.budget_limited = true;
         texture_steps = least_step(texture_steps, [&](int t) { return try_plan(s, residency, kMostCoarsening, t); });

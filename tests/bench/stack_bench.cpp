@@ -1,10 +1,9 @@
 // Nanoseconds a texel that an image stack takes besides decoding, and for decoding, by kind of layer; one thread.
-// usage: scree_stack_bench [FILE.tif...]: decoding of these alone; without any the layers.
+// usage: scree_stack_bench [WORD | FILE...]: layers, all or those whose names hold the word; or decoding of files.
 #include <fmt/format.h>
 
 #include <cmath>
 #include <ctime>
-#include <random>
 #include <string>
 #include <vector>
 
@@ -52,9 +51,11 @@ void write_picture(const std::string& path, const Layout& layout) {
     t.raster_type = RasterPixelIsArea;
     t.projected = layout.epsg;
     std::vector<std::uint8_t> bytes(static_cast<std::size_t>(kSide) * kSide * static_cast<std::size_t>(t.channels));
-    std::mt19937 random(1);
-    for (std::size_t k = 0; k < bytes.size(); ++k)
-        bytes[k] = t.channels == 4 && k % 4 == 3 ? 255 : static_cast<std::uint8_t>(random());
+    std::uint64_t random = 1;
+    for (std::size_t k = 0; k < bytes.size(); ++k) {
+        random = random * 6364136223846793005U + 1442695040888963407U;
+        bytes[k] = t.channels == 4 && k % 4 == 3 ? 255 : static_cast<std::uint8_t>(random >> 56);
+    }
     test::write_tiff(path, t, bytes.data());
 }
 
@@ -132,8 +133,11 @@ void decode(const std::string& path) {
 
 int main(int argc, char** argv) {
     using namespace scree;
-    for (int k = 1; k < argc; ++k) decode(argv[k]);
-    if (argc > 1) return 0;
+    const std::string word = argc > 1 ? argv[1] : "";
+    if (word.find('.') != std::string::npos) {
+        for (int k = 1; k < argc; ++k) decode(argv[k]);
+        return 0;
+    }
     const test::TemporaryFolder folder;
     for (const Layout& layout : {Layout{"on the grid, RGB", 3, 1, 0, 32633, Kernel::bilinear},
                                  Layout{"on the grid, RGBA", 4, 1, 0, 32633, Kernel::bilinear},
@@ -147,6 +151,6 @@ int main(int argc, char** argv) {
                                  Layout{"another zone, bilinear", 3, 0.8, 0, 32632, Kernel::bilinear},
                                  Layout{"another zone, cubic", 3, 0.8, 0, 32632, Kernel::cubic},
                                  Layout{"another zone, mean of 1.3", 3, 1.3, 0, 32632, Kernel::bilinear}})
-        measure(layout, folder);
+        if (std::string(layout.name).find(word) != std::string::npos) measure(layout, folder);
     return 0;
 }

@@ -192,6 +192,7 @@ protected:
         EXPECT_FALSE(progress.finished);
         auto writer = SqliteStoreWriter::resume(path_);
         std::size_t found = 0;
+        SCOPED_TRACE(writer ? "resumed" : writer.error().message);
         if (writer) {
             while (found < story.size() && story[found].state != (*writer)->state()) ++found;
             ASSERT_LT(found++, story.size()) << "unknown state " << (*writer)->state();

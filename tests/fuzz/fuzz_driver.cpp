@@ -2,7 +2,7 @@
 // a failure is repeated by --seed S --from n --runs 1.
 //   --runs N      mutations (default 20000)
 //   --seconds S   instead of a number of runs
-//   --seed S, --from N
+//   --seed S|random, --from N
 //   --write DIR   the seeds as files, for libFuzzer's corpus
 //   FILE...       just these inputs
 #include <unistd.h>
@@ -137,7 +137,8 @@ Options parse(int count, char** words) {
         const char* value = words[++i];
         if (word == "--runs") o.runs = std::strtoull(value, nullptr, 10);
         if (word == "--from") o.from = std::strtoull(value, nullptr, 10);
-        if (word == "--seed") o.seed = std::strtoull(value, nullptr, 10);
+        if (word == "--seed")
+            o.seed = value == std::string_view("random") ? std::random_device{}() : std::strtoull(value, nullptr, 10);
         if (word == "--seconds") o.seconds = std::strtod(value, nullptr);
         if (word == "--write") o.write_to = value;
     }
@@ -159,7 +160,7 @@ void run_mutations(const Options& o, const std::vector<std::string>& from) {
         for (std::size_t i = 1 + below(random, 6); i > 0; --i) mutate(random, input, from);
         run_one(input);
     }
-    std::printf("%" PRIu64 " runs\n", run - o.from);
+    std::printf("%" PRIu64 " runs of seed %" PRIu64 "\n", run - o.from, o.seed);
 }
 
 int run(const Options& o) {

@@ -1,5 +1,5 @@
-// What places a raster: GeoTIFF tags, world files, .prj files, names of .hgt tiles, and GDAL's metadata. The first byte
-// of an input says which.
+// What places a raster: GeoTIFF tags, world files, .prj files, names of .hgt tiles, GDAL's metadata and .aux.xml. The
+// first byte of an input says which.
 #include <cmath>
 #include <filesystem>
 
@@ -9,6 +9,7 @@
 #include "tools/source/gdal_metadata.h"
 #include "tools/source/georeference.h"
 #include "tools/source/grid_file.h"
+#include "tools/source/pam_file.h"
 #include "tools/source/projection_file.h"
 
 namespace scree::fuzz {
@@ -87,7 +88,13 @@ std::vector<std::string> seeds() {
         std::string("\3") + "NASADEM_HGT_n05_w001_v2",
         std::string("\4") +
             "<GDALMetadata>\n<Item name=\"OFFSET\" sample=\"0\" role=\"offset\">-5</Item>\n"
-            "<Item name='U' role='unittype' sample='0'>ft</Item></GDALMetadata>"};
+            "<Item name='U' role='unittype' sample='0'>ft</Item></GDALMetadata>",
+        std::string("\5") +
+            "<PAMDataset>\n <SRS dataAxisToSRSAxisMapping=\"2,1\">GEOGCS[&quot;WGS 84&quot;,&lt;&amp;]</SRS>\n"
+            " <GeoTransform>  1.5e+02, 30, 2,  4.4e+06, 1, -20</GeoTransform>\n"
+            " <PAMRasterBand band=\"2\"><NoDataValue>1</NoDataValue></PAMRasterBand>\n"
+            " <PAMRasterBand band=\"1\">\n  <NoDataValue le_hex_equiv=\"00\">-9999</NoDataValue>\n </PAMRasterBand>\n"
+            "</PAMDataset>"};
 }
 
 }  // namespace scree::fuzz
@@ -97,7 +104,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     using namespace scree::fuzz;
     if (size == 0) return 0;
     const std::string_view content = text_of(data + 1, size - 1);
-    switch (data[0] % 5) {
+    switch (data[0] % 6) {
         case 0:
             check(read_georeference(folder().write("t.tif", content)));
             break;
@@ -115,6 +122,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         case 3:
             open_named_tile(content);
             break;
+        case 5: {
+            const auto pam = parse_pam(content);
+            require(pam.ok() || pam.error().code == ErrorCode::input, "what cannot be read is an input error");
+            Georeference place;
+            if (pam && pam->geotransform && place_by(*pam, "p", place)) check(std::optional(place));
+            break;
+        }
         default: {
             const GdalBandMetadata band = parse_gdal_metadata(content);
             require(std::isfinite(band.scale) && band.scale != 0 && std::isfinite(band.offset), "scales are numbers");

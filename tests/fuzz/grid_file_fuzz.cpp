@@ -98,6 +98,11 @@ std::vector<std::string> seeds() {
         of_kind(5, "ncols 4\nnrows 5\nxllcorner 1\nyllcorner 2\ncellsize 3\nNODATA_value -9999\nbyteorder MSBFIRST\n"),
         of_kind(7, usgs_dem("     1    10", "0.100000E+01", "")),
         of_kind(7, usgs_dem("     1    10", "0.100000E+00", "\r\n")),
+        of_kind(7, usgs_dem("     2   401", "0.100000E+01", "")),
+        of_kind(8,
+                "ENVI\nsamples = 4\nlines = 3\ndata type = 1\nmap info = {UTM, 2, 3, 5, 6, 7, 7, 33, North, WGS-84, "
+                "units=Meters, rotation=30}\n"),
+        of_kind(2, "NROWS 3\nNCOLS 4\nNBITS 16\nDX 2\nDY 3\nXLLCORNER 1\nYLLCENTER 2\n"),
         of_kind(8,
                 "ENVI\ndescription = {\n x}\nsamples = 4\nlines = 3\nbands = 2\nheader offset = 1\ndata type = 2\n"
                 "interleave = bil\nbyte order = 1\nmap info = {UTM, 1, 1, 5, 6, 7, 8, 33, North, WGS-84}\n"
@@ -129,7 +134,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (!grid->has_value()) return 0;
     if ((*grid)->georeference) {
         const Georeference& place = *(*grid)->georeference;
-        require(std::isfinite(place.first_x) && std::isfinite(place.first_y) && place.column_x != 0 && place.row_y != 0,
+        require(std::isfinite(place.first_x) && std::isfinite(place.first_y) &&
+                    place.column_x * place.row_y != place.column_y * place.row_x,
                 "an opened grid lies somewhere");
     }
     decode_all(path, **grid);

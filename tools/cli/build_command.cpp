@@ -20,6 +20,9 @@ namespace {
 const std::map<std::string, Kernel> kKernels = {
     {"nearest", Kernel::nearest}, {"bilinear", Kernel::bilinear}, {"cubic", Kernel::cubic}};
 
+const std::map<std::string, TextureQuality> kTextureQualities = {{"normal", TextureQuality::normal},
+                                                                 {"high", TextureQuality::high}};
+
 void print_plan(const BuildPlan& plan) {
     const Dataset& d = plan.dataset;
     const Lattice& l = d.lattice;
@@ -29,6 +32,7 @@ void print_plan(const BuildPlan& plan) {
     const MosaicPlan& m = plan.mosaic;
     if (!m.crs_reason.empty()) note("CRS: {}\n", m.crs_reason);
     if (!m.heights_copied) note("heights are resampled: their samples are no square grid of {}\n", crs_label(d));
+    for (const std::string& conversion : m.conversions) note("{}\n", conversion);
     for (const std::string& warning : m.warnings) note("warning: {}\n", warning);
     note("textures: {} levels, {} m a texel; memory: about {} MiB\n", d.texture_deepest_level + 1,
          d.texel_m(d.texture_deepest_level), plan.memory_bytes >> 20);
@@ -75,6 +79,10 @@ int run_build(int argc, char** argv) {
         ->capture_default_str();
     app.add_option("--texture-size", options.texture_size, "Texels along a texture tile, a power of two")
         ->capture_default_str();
+    app.add_option("--texture-quality", options.texture_quality,
+                   "DXT1: normal, or high for 0.2 to 0.9 dB more at a fifteenth of the speed")
+        ->transform(CLI::CheckedTransformer(kTextureQualities, CLI::ignore_case))
+        ->default_str("normal");
     app.add_option("--height-quantum", options.height_quantum_m,
                    "Metres of the height unit; default: the source's own for integers, 1/64 m otherwise");
     app.add_option("--threads", options.threads, "0: one a core")->capture_default_str()->check(CLI::Range(0, 1024));

@@ -8,6 +8,8 @@ void add_height_options(CLI::App& app, HeightReading& reading) {
         ->capture_default_str();
     app.add_option("--height-offset", reading.height_offset_m, "z = value * scale + offset, in metres")
         ->capture_default_str();
+    app.add_option("--vertical-crs", reading.vertical_crs,
+                   "Vertical CRS of the heights, EPSG:n; heights of files that name another are converted to it");
     app.add_option("--nodata", reading.nodata, "A height value that means void, besides the file's own");
 }
 

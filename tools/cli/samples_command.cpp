@@ -133,7 +133,7 @@ private:
             for (const LayerMember& member : layer.members) {
                 const PlacedFile& f = plan_.heights[member.file];
                 block.names.push_back(file_name(f.path));
-                exact_in_float = exact_in_float && fits_float32(f.info.type) &&
+                exact_in_float = exact_in_float && fits_float32(f.info.type) && !f.datum_change &&
                                  units_of(f.info, f.where, options_.request.reading) == HeightUnits{};
             }
             block.sample_bytes = exact_in_float ? 4 : 8;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cassert>
 #include <cstring>
+#include <iterator>
 #include <span>
 #include <utility>
 
@@ -11,8 +12,8 @@ namespace scree {
 namespace {
 
 constexpr std::size_t kBlockPixels = SpooledPixels::kBlock * SpooledPixels::kBlock;
-constexpr std::int64_t kBlockBytes = static_cast<std::int64_t>(kBlockPixels) * 4;
-constexpr std::size_t kMostSpare = 8;
+constexpr std::size_t kMostSpare = 8;          // bands
+constexpr std::size_t kMostSpareBlocks = 512;  // 8 MiB
 
 std::int64_t parts(std::int64_t whole, std::int64_t part) { return (whole + part - 1) / part; }
 
@@ -53,6 +54,7 @@ bool FilePixels::want_rows(std::int64_t row_begin, std::int64_t row_end, std::in
 }
 
 Result<void> FilePixels::fetch(OpenImages& images, const ReadProgress& progress) {
+    if (auto ok = make_room(); !ok) return ok;
     for (; wanted_begin_ < wanted_end_; ++wanted_begin_) {
         Band& band = bands_[static_cast<std::size_t>(wanted_begin_)];
         if (!band.wanted) continue;
@@ -89,7 +91,8 @@ void FilePixels::release(std::int64_t j, const LastReading& last, OpenImages& im
     while (live_begin_ < live_end_ && try_release(live_begin_, j, last)) ++live_begin_;
     while (live_begin_ < live_end_ && try_release(live_end_ - 1, j, last)) --live_end_;
     if (absent_ == 0) images.close(file_);
-    drop_copies(j);
+    if (live_begin_ == live_end_) finish();
+    forget_north_of(j);
 }
 
 bool FilePixels::try_release(std::int64_t b, std::int64_t j, const LastReading& last) {
@@ -139,24 +142,37 @@ Result<void> RowPixels::read(const SampleRectangle& part, std::uint32_t* out, st
     return {};
 }
 
-// --- on disk ---
+// --- in memory or on disk ---
 
 SpooledPixels::SpooledPixels(const PlacedFile& file, std::size_t index, const TemporaryFile& spool, std::int64_t at,
-                             std::int64_t& room_bytes)
+                             SpoolMemory& memory)
     : FilePixels(file, index, kBlock),
       spool_(spool),
       at_(at),
       blocks_across_(parts(file.info.width, kBlock)),
       unit_rows_(file.info.unit_rows),
-      room_bytes_(room_bytes) {}
-
-SpooledPixels::~SpooledPixels() = default;
+      memory_(memory),
+      spooled_(static_cast<std::size_t>(band_count())) {}
 
 std::int64_t SpooledPixels::file_bytes(const ImageInfo& info) {
     return parts(info.width, kBlock) * parts(info.height, kBlock) * kBlockBytes;  // sides are below 2^31
 }
 
 std::int64_t SpooledPixels::place_of(std::int64_t block) const { return at_ + block * kBlockBytes; }
+
+bool SpooledPixels::has_memory() const { return memory_.taken + kBlockBytes <= memory_.bytes; }
+
+SpooledPixels::Pixels SpooledPixels::take_memory() {
+    if (memory_.spare.empty()) return std::make_unique_for_overwrite<std::uint32_t[]>(kBlockPixels);
+    Pixels pixels = std::move(memory_.spare.back());
+    memory_.spare.pop_back();
+    return pixels;
+}
+
+void SpooledPixels::give_back(Block& block) {
+    memory_.taken -= kBlockBytes;
+    if (block.pixels && memory_.spare.size() < kMostSpareBlocks) memory_.spare.push_back(std::move(block.pixels));
+}
 
 void SpooledPixels::want(const SampleRectangle& part, std::int64_t until) {
     const bool decodes = want_rows(part.row, part.row + part.rows, until, true);
@@ -169,66 +185,113 @@ void SpooledPixels::want(const SampleRectangle& part, std::int64_t until) {
     for (std::int64_t by = part.row / kBlock; by * kBlock < part.row + part.rows; ++by)
         for (std::int64_t bx = part.column / kBlock; bx * kBlock < part.column + part.columns; ++bx) {
             const std::int64_t block = by * blocks_across_ + bx;
-            const auto found = copies_.find(block);
-            if (found != copies_.end()) {
+            const auto found = blocks_.find(block);
+            if (found != blocks_.end()) {
                 found->second.until = std::max(found->second.until, until);
-            } else if (room_bytes_ >= kBlockBytes) {
-                room_bytes_ -= kBlockBytes;
-                copies_.emplace(block, Copy{until, nullptr});
+            } else if (has_memory()) {
+                memory_.taken += kBlockBytes;
+                blocks_[block].until = until;
                 to_load_.push_back(block);
             }
         }
 }
 
 std::uint32_t* SpooledPixels::room_for(std::int64_t) {
-    decoded_.resize(static_cast<std::size_t>(kBlock * width()));
-    return decoded_.data();
+    memory_.decoded.resize(std::max(memory_.decoded.size(), static_cast<std::size_t>(kBlock * width())));
+    return memory_.decoded.data();
 }
 
-// Blocks side by side go out in one piece.
-Result<void> SpooledPixels::keep(std::int64_t band) {
-    arranged_.assign(static_cast<std::size_t>(blocks_across_) * kBlockPixels, 0);
-    std::int64_t begin = 0;
-    const auto write_to = [&](std::int64_t end) -> Result<void> {
-        if (begin == end) return {};
-        const std::span<const std::uint32_t> pixels(arranged_.data() + static_cast<std::size_t>(begin) * kBlockPixels,
-                                                    static_cast<std::size_t>(end - begin) * kBlockPixels);
-        return spool_.write(place_of(band * blocks_across_ + begin), std::as_bytes(pixels));
-    };
+void SpooledPixels::arrange(std::int64_t band) {
+    memory_.arranged.assign(static_cast<std::size_t>(blocks_across_) * kBlockPixels, 0);
     for (std::int64_t bx = 0; bx < blocks_across_; ++bx) {
-        std::uint32_t* block = arranged_.data() + static_cast<std::size_t>(bx) * kBlockPixels;
+        const std::uint32_t* from = memory_.decoded.data() + bx * kBlock;
+        std::uint32_t* to = memory_.arranged.data() + static_cast<std::size_t>(bx) * kBlockPixels;
         const std::int64_t columns = std::min(kBlock, width() - bx * kBlock);
-        for (std::int64_t r = 0; r < rows_of(band); ++r)
-            copy_pixels(decoded_.data() + r * width() + bx * kBlock, columns, block + r * kBlock);
-        const auto found = copies_.find(band * blocks_across_ + bx);
-        if (found != copies_.end()) {
-            if (!found->second.pixels)
-                found->second.pixels = std::make_unique_for_overwrite<std::uint32_t[]>(kBlockPixels);
-            copy_pixels(block, kBlockPixels, found->second.pixels.get());
-        }
-        if (std::any_of(block, block + kBlockPixels, [](std::uint32_t v) { return v != 0; })) continue;
-        if (auto ok = write_to(bx); !ok) return ok;
+        for (std::int64_t r = 0; r < rows_of(band); ++r) copy_pixels(from + r * width(), columns, to + r * kBlock);
+    }
+}
+
+// Blocks side by side that go out go in one piece.
+Result<void> SpooledPixels::keep(std::int64_t band) {
+    arrange(band);
+    const std::int64_t first = band * blocks_across_;
+    std::int64_t begin = 0;
+    for (std::int64_t bx = 0; bx <= blocks_across_; ++bx) {
+        const std::uint32_t* pixels = memory_.arranged.data() + static_cast<std::size_t>(bx) * kBlockPixels;
+        if (bx < blocks_across_ && !keep_in_memory(first + bx, pixels)) continue;
+        if (begin < bx)
+            if (auto ok = spool(first + begin, bx - begin,
+                                memory_.arranged.data() + static_cast<std::size_t>(begin) * kBlockPixels);
+                !ok)
+                return ok;
         begin = bx + 1;
     }
-    return write_to(blocks_across_);
+    return {};
+}
+
+// Or nowhere: what is not in the spool is nothing.
+bool SpooledPixels::keep_in_memory(std::int64_t block, const std::uint32_t* pixels) {
+    const bool nothing = std::all_of(pixels, pixels + kBlockPixels, [](std::uint32_t v) { return v == 0; });
+    const auto found = blocks_.find(block);
+    if (found == blocks_.end() && nothing) return true;
+    if (found == blocks_.end() && !has_memory()) return false;
+    if (found == blocks_.end()) memory_.taken += kBlockBytes;
+    Block& kept = blocks_[block];
+    if (!kept.pixels) kept.pixels = take_memory();
+    copy_pixels(pixels, kBlockPixels, kept.pixels.get());
+    kept.spooled = nothing;
+    return true;
+}
+
+Result<void> SpooledPixels::spool(std::int64_t first_block, std::int64_t count, const std::uint32_t* pixels) {
+    spooled_[static_cast<std::size_t>(first_block / blocks_across_)] = true;
+    return spool_.write(place_of(first_block),
+                        std::as_bytes(std::span(pixels, static_cast<std::size_t>(count) * kBlockPixels)));
 }
 
 void SpooledPixels::drop(std::int64_t band) {
-    spool_.forget(place_of(band * blocks_across_), blocks_across_ * kBlockBytes);
+    const std::int64_t first = band * blocks_across_;
+    for (std::int64_t block = first; block < first + blocks_across_; ++block) {
+        const auto found = blocks_.find(block);
+        if (found == blocks_.end()) continue;
+        give_back(found->second);
+        blocks_.erase(found);
+    }
+    if (!spooled_[static_cast<std::size_t>(band)]) return;
+    spool_.forget(place_of(first), blocks_across_ * kBlockBytes);
+    spooled_[static_cast<std::size_t>(band)] = false;
 }
 
-void SpooledPixels::drop_copies(std::int64_t j) {
-    const std::size_t dropped = std::erase_if(copies_, [&](const auto& copy) { return copy.second.until <= j; });
-    room_bytes_ += static_cast<std::int64_t>(dropped) * kBlockBytes;
+void SpooledPixels::forget_north_of(std::int64_t j) {
+    unwanted_north_of_ = std::max(unwanted_north_of_, j);
+    for (auto entry = blocks_.begin(); entry != blocks_.end();) {
+        Block& block = entry->second;
+        const bool goes = block.until <= j && block.spooled;
+        if (goes) give_back(block);
+        entry = goes ? blocks_.erase(entry) : std::next(entry);
+    }
+}
+
+// Where memory is short, what nobody waits for goes to the spool.
+Result<void> SpooledPixels::make_room() {
+    if (!wants_decoding() || memory_.taken <= memory_.bytes / 2) return {};
+    for (auto& [index, block] : blocks_) {
+        if (block.until > unwanted_north_of_ || block.spooled || !block.pixels) continue;
+        if (auto ok = spool(index, 1, block.pixels.get()); !ok) return ok;
+        block.spooled = true;
+    }
+    forget_north_of(unwanted_north_of_);
+    return {};
 }
 
 Result<void> SpooledPixels::load_wanted() {
     for (; !to_load_.empty(); to_load_.pop_back()) {
-        const auto found = copies_.find(to_load_.back());
-        if (found == copies_.end() || found->second.pixels) continue;
-        auto pixels = std::make_unique_for_overwrite<std::uint32_t[]>(kBlockPixels);
+        const auto found = blocks_.find(to_load_.back());
+        if (found == blocks_.end() || found->second.pixels) continue;
+        Pixels pixels = take_memory();
         if (auto ok = load(to_load_.back(), pixels.get()); !ok) return ok;
         found->second.pixels = std::move(pixels);
+        found->second.spooled = true;
     }
     return {};
 }
@@ -246,8 +309,8 @@ Result<void> SpooledPixels::read(const SampleRectangle& part, std::uint32_t* out
         for (std::int64_t bx = part.column / kBlock; bx * kBlock < column_end; ++bx) {
             const std::int64_t left = std::max(part.column, bx * kBlock),
                                right = std::min(column_end, (bx + 1) * kBlock);
-            const auto copy = copies_.find(by * blocks_across_ + bx);
-            const std::uint32_t* block = copy == copies_.end() ? nullptr : copy->second.pixels.get();
+            const auto found = blocks_.find(by * blocks_across_ + bx);
+            const std::uint32_t* block = found == blocks_.end() ? nullptr : found->second.pixels.get();
             if (block == nullptr) {
                 if (auto ok = load(by * blocks_across_ + bx, loaded.data()); !ok) return ok;
                 block = loaded.data();

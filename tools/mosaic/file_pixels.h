@@ -7,6 +7,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <span>
 #include <unordered_map>
 #include <vector>
 
@@ -54,7 +55,12 @@ protected:
     /// The rows are in the room.
     virtual Result<void> keep(std::int64_t band) = 0;
     virtual void drop(std::int64_t band) = 0;
-    virtual void drop_copies(std::int64_t) {}
+    /// Nothing is wanted for points north of grid row j any more.
+    virtual void forget_north_of(std::int64_t) {}
+    /// Nothing is held any more.
+    virtual void finish() {}
+    /// Before decoding.
+    virtual Result<void> make_room() { return {}; }
     /// After decoding.
     virtual Result<void> load_wanted() { return {}; }
 
@@ -99,21 +105,31 @@ private:
     std::uint32_t* room_for(std::int64_t band) override;
     Result<void> keep(std::int64_t) override { return {}; }
     void drop(std::int64_t band) override;
+    void finish() override { spare_.clear(); }
 
     std::vector<Rows> rows_;   ///< of each band; null: not held
     std::vector<Rows> spare_;  ///< fresh memory costs more than what is written into it
 };
 
-/// Blocks of 64 x 64 pixels in a temporary file, a band of 64 rows after the other; each has its place there, and those
-/// that hold nothing are not written. Those that are wanted now stand in memory as far as that has room.
+/// Memory that all spooled files of a stack share.
+struct SpoolMemory {
+    std::int64_t bytes = 0;  ///< that blocks may take
+    std::int64_t taken = 0;
+    std::vector<std::unique_ptr<std::uint32_t[]>> spare;  ///< blocks
+    std::vector<std::uint32_t> decoded, arranged;         ///< a band, by rows and by blocks
+};
+
+/// Blocks of 64 x 64 pixels, in memory as long as that has room and else in a temporary file, a band of 64 rows after
+/// the other; each has its place there, and those that hold nothing are not written. Those that are wanted are in
+/// memory before others are.
 class SpooledPixels final : public FilePixels {
 public:
     static constexpr std::int64_t kBlock = 64;
+    static constexpr std::int64_t kBlockBytes = kBlock * kBlock * 4;
 
-    /// `at`: where its part of the spool begins. `room_bytes`: memory for blocks, which all files of a stack share.
+    /// `at`: where its part of the spool begins.
     SpooledPixels(const PlacedFile& file, std::size_t index, const TemporaryFile& spool, std::int64_t at,
-                  std::int64_t& room_bytes);
-    ~SpooledPixels() override;
+                  SpoolMemory& memory);
     /// Of the spool at most.
     static std::int64_t file_bytes(const ImageInfo& info);
 
@@ -121,24 +137,34 @@ public:
     Result<void> read(const SampleRectangle& part, std::uint32_t* out, std::int64_t pitch) const override;
 
 private:
-    struct Copy {
-        std::int64_t until = 0;
-        std::unique_ptr<std::uint32_t[]> pixels;  ///< null: to be loaded
+    using Pixels = std::unique_ptr<std::uint32_t[]>;
+    struct Block {
+        std::int64_t until = std::numeric_limits<std::int64_t>::min();  ///< wanted for points north of this grid row
+        Pixels pixels;                                                  ///< null: to be loaded
+        bool spooled = false;                                           ///< it stands in the spool, too
     };
     std::uint32_t* room_for(std::int64_t band) override;
     Result<void> keep(std::int64_t band) override;
     void drop(std::int64_t band) override;
-    void drop_copies(std::int64_t j) override;
+    void forget_north_of(std::int64_t j) override;
+    Result<void> make_room() override;
     Result<void> load_wanted() override;
+    void arrange(std::int64_t band);
+    bool keep_in_memory(std::int64_t block, const std::uint32_t* pixels);
     Result<void> load(std::int64_t block, std::uint32_t* pixels) const;
+    Result<void> spool(std::int64_t first_block, std::int64_t count, const std::uint32_t* pixels);
+    bool has_memory() const;
+    Pixels take_memory();
+    void give_back(Block& block);
     std::int64_t place_of(std::int64_t block) const;
 
     const TemporaryFile& spool_;
     std::int64_t at_, blocks_across_, unit_rows_;
-    std::int64_t& room_bytes_;
-    std::unordered_map<std::int64_t, Copy> copies_;
+    SpoolMemory& memory_;
+    std::unordered_map<std::int64_t, Block> blocks_;  ///< in memory, or about to be
     std::vector<std::int64_t> to_load_;
-    std::vector<std::uint32_t> decoded_, arranged_;
+    std::vector<bool> spooled_;  ///< bands of which something was
+    std::int64_t unwanted_north_of_ = std::numeric_limits<std::int64_t>::min();
 };
 
 }  // namespace scree

@@ -24,8 +24,6 @@ constexpr std::int64_t kPieceColumns = 8 * WarpMap::kChunk;
 constexpr double kMostShrink = 4;
 constexpr std::int64_t kBandRows = 64;
 constexpr std::int64_t kDecoderBandBytes = std::int64_t{1} << 20;  // small strips are decoded so many at a time
-// Copies of spooled blocks in memory. Less: they are read from the temporary file again and again.
-constexpr std::int64_t kCopiesBytes = std::int64_t{256} << 20;
 
 // Points [i, i + columns) x [j, j + rows).
 struct Area {
@@ -71,11 +69,10 @@ struct MappedLines {
     }
 };
 
-std::optional<SampleRectangle> window_of_lines(const LayerOnGrid& layer, const Area& area) {
-    // The outermost points stand for all of them.
-    const MappedLines lines(layer, area);
-    std::vector<double> column{lines.column.front(), lines.column.back()}, row{lines.row.front(), lines.row.back()};
-    return source_window({column, row}, layer.layer, layer.rule_at(area.i, area.j));
+std::optional<SampleRectangle> window_of(const LayerOnGrid& layer, const Area& area) {
+    const auto bounds = layer.map.bounds(area.i, area.j, area.columns, area.rows);
+    if (!bounds) return std::nullopt;
+    return source_window(*bounds, layer.layer, layer.rule_at(area.i, area.j));
 }
 
 template <class Use>
@@ -94,15 +91,11 @@ void for_each_chunk(const Area& area, Use&& use) {
 
 void want(LayerOnGrid& layer, const Area& area) {
     const std::int64_t until = area.j + area.rows;
-    if (layer.lattice) {
-        if (const auto window = window_of_lines(layer, area)) layer.pixels->want(*window, until);
-        return;
-    }
-    for_each_chunk(area, [&](const Area& chunk) {
-        MappedPoints mapped(layer, chunk);
-        const auto window = source_window(mapped.points(), layer.layer, layer.rule_at(chunk.i, chunk.j));
-        if (window) layer.pixels->want(*window, until);
-    });
+    const auto want_part = [&](const Area& part) {
+        if (const auto window = window_of(layer, part)) layer.pixels->want(*window, until);
+    };
+    if (layer.lattice) return want_part(area);
+    for_each_chunk(area, want_part);
 }
 
 // --- sampling ---
@@ -177,7 +170,7 @@ private:
             if (columns && rows) return copy(*columns, *rows, area, out);
         }
         const ResampleRule rule = layer_.rule_at(area.i, area.j);
-        return resample(area, window_of_lines(layer_, area), out, [&](const auto& window, auto fresh) {
+        return resample(area, window_of(layer_, area), out, [&](const auto& window, auto fresh) {
             resample_colour_lines(window, {lines.column, lines.row}, rule, fresh);
         });
     }
@@ -248,7 +241,7 @@ Result<void> sample_piece(const std::vector<LayerOnGrid>& layers, const Area& ar
                           Scratch& scratch) {
     bool empty = true;
     for (auto layer = layers.rbegin(); layer != layers.rend(); ++layer) {
-        if (layer->lattice && !window_of_lines(*layer, area)) continue;
+        if (layer->lattice && !window_of(*layer, area)) continue;
         if (empty) {
             if (auto ok = LayerSampler(*layer, scratch).sample(area, out); !ok) return ok;
             empty = false;
@@ -383,20 +376,12 @@ private:
 };
 
 // Bytes of what waits for a band of 64 rows.
-std::int64_t waiting_bytes(const LayerOnGrid& layer, const std::vector<PlacedFile>& files, std::int64_t points_wide) {
+std::int64_t waiting_bytes(const LayerOnGrid& layer, const std::vector<PlacedFile>& files) {
     const WarpMap::Shrink shrink = layer.map.shrink_at(0, 0);
-    const auto samples = [&](std::int64_t points, double step) {
-        return static_cast<std::int64_t>(std::ceil(static_cast<double>(points) * std::min(step, 0x1p20)));
-    };
-    const std::int64_t reach = 2 * (kernel_reach(layer.kernel, shrink.rows) + 1) + 2;
-    if (layer.place == PixelPlace::memory)
-        return (samples(kBandRows, shrink.rows) + reach + 2 * RowPixels::kBandRows) *
-               abreast_of(layer.layer, files).samples * 4;
-    std::int64_t band = 0;
-    for (const LayerMember& member : layer.layer.members)
-        band = std::max(band, 2 * SpooledPixels::kBlock * files[member.file].info.width * 4);
-    return band + std::min(kCopiesBytes, (samples(kBandRows, shrink.rows) + reach + 2 * SpooledPixels::kBlock) *
-                                             (samples(points_wide, shrink.columns) + 2 * SpooledPixels::kBlock) * 4);
+    if (layer.place == PixelPlace::disk) return 0;
+    const auto rows = static_cast<std::int64_t>(std::ceil(static_cast<double>(kBandRows) * shrink.rows)) +
+                      2 * (kernel_reach(layer.kernel, shrink.rows) + 1) + 2 + 2 * RowPixels::kBandRows;
+    return rows * abreast_of(layer.layer, files).samples * 4;
 }
 
 }  // namespace
@@ -409,11 +394,13 @@ std::int64_t image_stack_bytes(const std::vector<PlacedFile>& files) {
 
 struct ImageStack::Impl {
     Impl(const std::vector<PlacedFile>& given, const StackOptions& options)
-        : files(given), images(files, options.open) {}
+        : files(given), images(files, options.open) {
+        memory.bytes = options.spool_memory_bytes;
+    }
 
     std::vector<PlacedFile> files;
     OpenImages images;
-    std::int64_t copies_bytes = kCopiesBytes;
+    SpoolMemory memory;
     std::vector<LayerOnGrid> layers;  ///< bottom to top
     std::vector<LastReader> readers;  ///< of each
 
@@ -424,8 +411,7 @@ struct ImageStack::Impl {
         if (!placed) return placed.error();
         impl->layers = std::move(*placed);
         for (LayerOnGrid& layer : impl->layers) {
-            auto pixels =
-                LayerPixels::create(layer.layer, impl->files, layer.place, options.temporary, impl->copies_bytes);
+            auto pixels = LayerPixels::create(layer.layer, impl->files, layer.place, options.temporary, impl->memory);
             if (!pixels) return pixels.error();
             layer.pixels = std::move(*pixels);
             impl->readers.emplace_back(layer, placing.grid, placing.grid_crs);
@@ -456,7 +442,7 @@ Result<std::unique_ptr<ImageStack>> ImageStack::read(const std::vector<PlacedFil
                                                      const StackOptions& options, const ReadProgress& progress) {
     auto impl = Impl::make({files, grid, grid_crs, options.kernel}, std::move(layers), PixelPlace::disk, options);
     if (!impl) return impl.error();
-    (*impl)->copies_bytes = 0;
+    (*impl)->memory.bytes = 0;
     for (LayerOnGrid& layer : (*impl)->layers) layer.pixels->want_all(kNever);
     if (auto ok = (*impl)->fetch(progress); !ok) return ok.error();
     return std::unique_ptr<ImageStack>(new ImageStack(std::move(*impl)));
@@ -491,16 +477,24 @@ Result<void> ImageStack::sample(std::int64_t i, std::int64_t j, std::int64_t col
 }
 
 std::int64_t ImageStack::bytes_needed(const std::vector<PlacedFile>& files, const std::vector<Layer>& layers,
-                                      const TargetGrid& grid, const Crs& grid_crs, std::int64_t points_wide) {
-    std::int64_t unit = 0, bytes = 0, open = 0;
+                                      const TargetGrid& grid, const Crs& grid_crs, std::int64_t) {
+    std::int64_t unit = 0, bytes = 0, open = 0, spooled = 0, spooled_band = 0;
     for (const PlacedFile& file : files) unit = std::max(unit, file.info.unit_bytes);
     // Where nothing can be placed, opening says so.
     if (auto placed = place_on({files, grid, grid_crs, Kernel::cubic}, layers, PixelPlace::memory))
         for (const LayerOnGrid& layer : *placed) {
-            bytes += waiting_bytes(layer, files, points_wide);
+            bytes += waiting_bytes(layer, files);
             open += abreast_of(layer.layer, files).files;
+            for (const LayerMember& member : layer.layer.members) {
+                if (layer.place == PixelPlace::memory) continue;
+                const ImageInfo& info = files[member.file].info;
+                spooled += SpooledPixels::file_bytes(info);
+                spooled_band =
+                    std::max(spooled_band, 2 * SpooledPixels::kBlock * (info.width + SpooledPixels::kBlock) * 4);
+            }
         }
-    return bytes + std::min(open, static_cast<std::int64_t>(OpenImages::kMost)) * (unit + kDecoderBandBytes);
+    return bytes + spooled_band + std::min(spooled, StackOptions().spool_memory_bytes) +
+           std::min(open, static_cast<std::int64_t>(OpenImages::kMost)) * (unit + kDecoderBandBytes);
 }
 
 std::int64_t ImageStack::temporary_bytes(const std::vector<PlacedFile>& files, const std::vector<Layer>& layers,

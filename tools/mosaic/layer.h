@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,12 @@
 
 namespace scree {
 
+/// Heights above one vertical reference that are to stand above another (VerticalCrs::parse).
+struct DatumChange {
+    std::string from, to;
+    LonLatBox area;  ///< of all heights: what the operation is chosen for
+};
+
 /// A file whose header has been read and whose place is known. Longitudes are within 180 degrees of the mosaic's first
 /// file's middle.
 struct PlacedFile {
@@ -19,6 +26,7 @@ struct PlacedFile {
     ImageInfo info;
     Georeference where;
     Crs crs;
+    std::optional<DatumChange> datum_change = std::nullopt;  ///< of heights
 };
 
 struct LayerMember {

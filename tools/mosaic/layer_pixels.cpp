@@ -52,7 +52,7 @@ bool lies_on_top(std::uint32_t later, std::uint32_t earlier) {
 
 Result<std::unique_ptr<LayerPixels>> LayerPixels::create(const Layer& layer, const std::vector<PlacedFile>& files,
                                                          PixelPlace place, const std::string& temporary,
-                                                         std::int64_t& room_bytes) {
+                                                         SpoolMemory& memory) {
     auto pixels = std::make_unique<LayerPixels>();
     if (place == PixelPlace::disk) {
         auto spool = TemporaryFile::create(temporary + ".layer");
@@ -66,7 +66,7 @@ Result<std::unique_ptr<LayerPixels>> LayerPixels::create(const Layer& layer, con
         if (place == PixelPlace::memory) {
             fresh.pixels = std::make_unique<RowPixels>(file, member.file);
         } else {
-            fresh.pixels = std::make_unique<SpooledPixels>(file, member.file, *pixels->spool_, at, room_bytes);
+            fresh.pixels = std::make_unique<SpooledPixels>(file, member.file, *pixels->spool_, at, memory);
             if (__builtin_add_overflow(at, SpooledPixels::file_bytes(file.info), &at))
                 return Error{ErrorCode::input, fmt::format("{}: no temporary file is large enough for all pixels of "
                                                            "the files up to this one",

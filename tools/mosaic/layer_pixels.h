@@ -21,11 +21,11 @@ enum class PixelPlace { memory, disk };
 
 class LayerPixels {
 public:
-    /// On disk: `temporary` is what the spool's name begins with; `room_bytes` as SpooledPixels has it. Errors:
+    /// On disk: `temporary` is what the spool's name begins with; `memory`: of the stack. Errors:
     /// ErrorCode::io.
     static Result<std::unique_ptr<LayerPixels>> create(const Layer& layer, const std::vector<PlacedFile>& files,
                                                        PixelPlace place, const std::string& temporary,
-                                                       std::int64_t& room_bytes);
+                                                       SpoolMemory& memory);
 
     /// As FilePixels has them, in the layer's samples; what lies outside of it is no matter.
     void want(const SampleRectangle& window, std::int64_t until);

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "tools/source/source_list.h"
+#include "tools/source/vertical_crs.h"
 
 namespace scree {
 namespace {
@@ -48,6 +49,7 @@ public:
         if (auto ok = place_files(); !ok) return ok;
         if (auto ok = check_datums(); !ok) return ok;
         if (auto ok = choose_crs_of_all(); !ok) return ok;
+        if (auto ok = convert_datums(); !ok) return ok;
         auto layers = group_layers(plan_.heights);
         if (!layers) return layers.error();
         plan_.height_layers = std::move(*layers);
@@ -168,6 +170,7 @@ private:
     }
 
     Result<void> check_datums() {
+        if (request_.reading.vertical_crs) return adopt_datum(*request_.reading.vertical_crs);
         std::string first;
         for (const PlacedFile& f : plan_.heights) {
             const std::string datum = datum_of(f);
@@ -178,9 +181,65 @@ private:
             } else if (datum != plan_.vertical_datum && !request_.assume_same_datum) {
                 return input_error(
                     fmt::format("{} has heights above {}, {} above {}: metres apart in places; "
-                                "--assume-same-datum takes them as they are",
+                                "--vertical-crs converts them, --assume-same-datum takes them as they are",
                                 f.path, datum, first, plan_.vertical_datum));
             }
+        }
+        return {};
+    }
+
+    // The one that was asked for. It has to be on record unless files name it and none names another: then nothing is
+    // converted, and a store that was built so can be judged so.
+    Result<void> adopt_datum(const std::string& asked) {
+        if (request_.assume_same_datum)
+            return usage_error("--vertical-crs converts heights, --assume-same-datum takes them as they are");
+        plan_.vertical_datum = asked;
+        std::string unnamed;
+        bool named = false, another = false;
+        for (const PlacedFile& f : plan_.heights) {
+            const std::string datum = datum_of(f);
+            if (datum.empty() && unnamed.empty()) unnamed = f.path;
+            named = named || datum == asked;
+            another = another || (!datum.empty() && datum != asked);
+        }
+        if (!unnamed.empty())
+            plan_.warnings.push_back(
+                fmt::format("{} names no vertical datum; its heights are taken to be above {}", unnamed, asked));
+        if (named && !another) return {};
+        auto target = VerticalCrs::parse(asked);
+        if (!target) return usage_error(fmt::format("--vertical-crs {}", target.error().message));
+        if (!target->up || std::abs(target->metres_per_unit - 1) > 1e-9)
+            return usage_error(fmt::format("--vertical-crs {}: {} does not count metres upwards, and terrain does",
+                                           asked, target->name));
+        return {};
+    }
+
+    // Which files' heights are changed, and by what: everything that can be refused is refused before a pixel is read.
+    Result<void> convert_datums() {
+        if (!request_.reading.vertical_crs) return {};
+        std::set<std::string> said;
+        for (PlacedFile& f : plan_.heights) {
+            const std::string datum = datum_of(f);
+            if (datum.empty() || datum == plan_.vertical_datum) continue;
+            if (!plan_.crs_known)
+                return input_error(
+                    fmt::format("{}: names no CRS, so its heights above {} cannot be converted to {}: "
+                                "the difference depends on the place",
+                                f.path, datum, plan_.vertical_datum));
+            auto from = VerticalCrs::parse(datum);
+            auto to = VerticalCrs::parse(plan_.vertical_datum);
+            if (!from) return input_error(fmt::format("{}: {}", f.path, from.error().message));
+            if (!to) return input_error(fmt::format("{}: {}", f.path, to.error().message));
+            // A file that names no unit counts in that of its CRS.
+            if (f.where.height_unit_m == 0) f.where.height_unit_m = from->metres_per_unit;
+            auto shift = VerticalShift::make(f.crs, *from, *to, plan_.box);
+            if (!shift) return input_error(fmt::format("{}: {}", f.path, shift.error().message));
+            if (shift->identity()) continue;
+            f.datum_change = DatumChange{datum, plan_.vertical_datum, plan_.box};
+            if (!said.insert(datum + shift->operation()).second) continue;
+            plan_.conversions.push_back(fmt::format(
+                "heights above {} become heights above {} by \"{}\"{}", datum, plan_.vertical_datum, shift->operation(),
+                shift->accuracy_m() > 0 ? fmt::format(", good for {} m", shift->accuracy_m()) : ""));
         }
         return {};
     }
@@ -380,8 +439,9 @@ private:
 
     bool one_unit() const {
         const HeightUnits first = units_of(plan_.heights.front().info, plan_.heights.front().where, request_.reading);
-        return std::all_of(plan_.heights.begin(), plan_.heights.end(),
-                           [&](const PlacedFile& f) { return units_of(f.info, f.where, request_.reading) == first; });
+        return std::all_of(plan_.heights.begin(), plan_.heights.end(), [&](const PlacedFile& f) {
+            return !f.datum_change && units_of(f.info, f.where, request_.reading) == first;
+        });
     }
 
     Result<void> keep_imagery_that_meets() {

@@ -31,17 +31,18 @@ struct MosaicPlan {
     std::vector<PlacedFile> heights, imagery;
     std::vector<Layer> height_layers, image_layers;
     Crs crs;
-    bool crs_known = false;      ///< false: files without any CRS, metres of their own
-    std::string crs_reason;      ///< one line for people; empty where there was nothing to choose
-    std::string vertical_datum;  ///< "EPSG:n" or empty
-    ScaleRange scale;            ///< of the CRS over the heights
-    LonLatBox box;               ///< of the heights, where the CRS is known
-    Lattice lattice;             ///< of the finest layer
+    bool crs_known = false;                ///< false: files without any CRS, metres of their own
+    std::string crs_reason;                ///< one line for people; empty where there was nothing to choose
+    std::string vertical_datum;            ///< "EPSG:n" or empty
+    std::vector<std::string> conversions;  ///< of heights to that datum, one sentence each
+    ScaleRange scale;                      ///< of the CRS over the heights
+    LonLatBox box;                         ///< of the heights, where the CRS is known
+    Lattice lattice;                       ///< of the finest layer
     /// Everything is built densely at every 2^base_shift-th point; finer layers deepen their own branches.
     int base_shift = 0;
     std::vector<int> layer_level;  ///< of each height layer: the coarsest level that loses nothing of it
     bool heights_copied = false;   ///< every height sample is a lattice point: nothing is resampled
-    bool same_units = false;       ///< one scale and offset for all files: raw values may be kept
+    bool same_units = false;       ///< one scale and offset for all files and no conversion: raw values may be kept
     double finest_pixel_m = 0;     ///< of the imagery, at its middle; 0 without imagery
     std::vector<std::string> warnings;
 

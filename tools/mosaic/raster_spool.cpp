@@ -140,6 +140,16 @@ Result<void> RasterSpool<T>::read(std::int64_t column, std::int64_t row, std::in
 }
 
 template <class T>
+bool RasterSpool<T>::holds_any(std::int64_t column, std::int64_t row, std::int64_t columns, std::int64_t rows) const {
+    const std::int64_t x0 = std::max<std::int64_t>(column, 0), x1 = std::min(column + columns, columns_);
+    const std::int64_t y0 = std::max<std::int64_t>(row, 0), y1 = std::min(row + rows, rows_);
+    for (std::int64_t by = y0 / kBlock; by * kBlock < y1; ++by)
+        for (std::int64_t bx = x0 / kBlock; bx * kBlock < x1; ++bx)
+            if (slot_of_.contains(block_index(bx, by))) return true;
+    return false;
+}
+
+template <class T>
 std::vector<typename RasterSpool<T>::Corner> RasterSpool<T>::corners() const {
     std::vector<std::int64_t> indices;
     for (const auto& [index, slot] : slot_of_) indices.push_back(index);

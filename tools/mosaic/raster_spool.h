@@ -39,6 +39,9 @@ public:
     Result<void> read(std::int64_t column, std::int64_t row, std::int64_t columns, std::int64_t rows,
                       std::span<T> out) const;
 
+    /// False: reading the window would give `nothing` alone.
+    bool holds_any(std::int64_t column, std::int64_t row, std::int64_t columns, std::int64_t rows) const;
+
     /// First samples of the blocks that hold anything, by rows.
     struct Corner {
         std::int64_t column = 0, row = 0;

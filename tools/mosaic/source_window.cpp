@@ -1,35 +1,53 @@
 #include "tools/mosaic/source_window.h"
 
+#include <emmintrin.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 namespace scree {
 namespace {
 
-struct Span {
+struct Range {
     double low = std::numeric_limits<double>::infinity(), high = -std::numeric_limits<double>::infinity();
 
-    void include(double v) {
-        low = std::min(low, v);
-        high = std::max(high, v);
-    }
     void clip(double low_limit, double high_limit) {
         low = std::max(low, low_limit);
         high = std::min(high, high_limit);
     }
 };
 
+// NaN takes no part: minimum and maximum are then their second operand.
+Range range_of(std::span<const double> values) {
+    Range range;
+    __m128d low = _mm_set1_pd(range.low), high = _mm_set1_pd(range.high);
+    std::size_t k = 0;
+    for (; k + 2 <= values.size(); k += 2) {
+        const __m128d both = _mm_loadu_pd(&values[k]);
+        low = _mm_min_pd(both, low);
+        high = _mm_max_pd(both, high);
+    }
+    if (k < values.size()) {
+        const __m128d last = _mm_set1_pd(values[k]);
+        low = _mm_min_pd(last, low);
+        high = _mm_max_pd(last, high);
+    }
+    return {std::min(_mm_cvtsd_f64(low), _mm_cvtsd_f64(_mm_unpackhi_pd(low, low))),
+            std::max(_mm_cvtsd_f64(high), _mm_cvtsd_f64(_mm_unpackhi_pd(high, high)))};
+}
+
 }  // namespace
 
 std::optional<SampleRectangle> source_window(const SourcePoints& points, const Layer& layer, const ResampleRule& rule) {
-    Span across, down;
-    for (std::size_t k = 0; k < points.column.size(); ++k) {
-        const double c = points.column[k], r = points.row[k];
-        if (!std::isfinite(c) || !std::isfinite(r)) continue;
-        across.include(c);
-        down.include(r);
-    }
+    const Range across = range_of(points.column), down = range_of(points.row);
+    return source_window({across.low, across.high, down.low, down.high}, layer, rule);
+}
+
+std::optional<SampleRectangle> source_window(const WarpMap::Bounds& bounds, const Layer& layer,
+                                             const ResampleRule& rule) {
+    Range across{bounds.west, bounds.east}, down{bounds.north, bounds.south};
     across.clip(-1, static_cast<double>(layer.columns));
     down.clip(-1, static_cast<double>(layer.rows));
     if (!(across.low <= across.high && down.low <= down.high)) return std::nullopt;

@@ -17,6 +17,10 @@ inline constexpr std::int64_t kMostWindowSamples = std::int64_t{1} << 18;
 /// layer. The windows of some of the points lie within that of all.
 std::optional<SampleRectangle> source_window(const SourcePoints& points, const Layer& layer, const ResampleRule& rule);
 
+/// The same for all points within bounds.
+std::optional<SampleRectangle> source_window(const WarpMap::Bounds& bounds, const Layer& layer,
+                                             const ResampleRule& rule);
+
 /// Chunks of the map (WarpMap::kChunk points a side), by the points' indices.
 std::int64_t chunk_of(std::int64_t i);
 std::int64_t chunk_middle(std::int64_t i);

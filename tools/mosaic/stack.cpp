@@ -7,6 +7,7 @@
 #include <limits>
 #include <optional>
 
+#include "tools/mosaic/height_shift.h"
 #include "tools/mosaic/source_window.h"
 #include "tools/source/suspect_values.h"
 
@@ -76,6 +77,8 @@ public:
     std::optional<SampleRectangle> window() const { return source_window(points_, layer_.spooled->layer, rule_); }
 
     Result<void> overlay(const SampleRectangle& w, std::span<double> out) {
+        // The boxes of scattered files are mostly empty.
+        if (!layer_.spooled->spool->holds_any(w.column, w.row, w.columns, w.rows)) return {};
         const auto count = static_cast<std::size_t>(w.count());
         std::vector<T> stored(count);
         if (auto ok = layer_.spooled->spool->read(w.column, w.row, w.columns, w.rows, stored); !ok) return ok;
@@ -212,8 +215,10 @@ Result<void> lay_file(const PlacedFile& file, const LayerMember& place, RasterSp
 template <class T>
 class HeightReader {
 public:
-    HeightReader(ImageSource& dem, const PlacedFile& file, const HeightReading& reading, bool raw)
+    HeightReader(ImageSource& dem, const PlacedFile& file, const HeightReading& reading, bool raw,
+                 const HeightShift* shift)
         : dem_(dem),
+          shift_(shift),
           path_(file.path),
           voids_(dem.info(), reading),
           suspects_(dem.info(), reading),
@@ -232,6 +237,8 @@ public:
                     return Error{ErrorCode::input, fmt::format("{}: value {} times its scale {} is no finite height",
                                                                path_, raw, units_.scale)};
             }
+        if (shift_ != nullptr)
+            if (auto ok = shift_->apply(begin, end, values_); !ok) return ok;
         for (const double v : values_)
             if (std::isfinite(v)) range_.include({v, v});
         std::transform(values_.begin(), values_.end(), out.begin(), [](double v) { return static_cast<T>(v); });
@@ -243,6 +250,7 @@ public:
 
 private:
     ImageSource& dem_;
+    const HeightShift* shift_;  // null: heights stay
     std::string path_;
     VoidRule voids_;
     SuspectValues suspects_;
@@ -284,7 +292,13 @@ Result<std::vector<SpooledLayer<T>>> read_heights(const std::vector<PlacedFile>&
             auto dem = open_heights(file.path, options.open);
             if (!dem) return dem.error();
             if (auto same = check_unchanged(file, (*dem)->info()); !same) return same.error();
-            HeightReader<T> reader(**dem, file, options.heights, raw);
+            std::optional<HeightShift> shift;
+            if (file.datum_change) {
+                auto made = HeightShift::make(file);
+                if (!made) return made.error();
+                shift.emplace(std::move(*made));
+            }
+            HeightReader<T> reader(**dem, file, options.heights, raw, shift ? &*shift : nullptr);
             if (auto ok = lay_file<T>(
                     file, member, *fresh->spool,
                     [&](std::int64_t begin, std::int64_t end, std::span<T> out) { return reader(begin, end, out); },
@@ -308,7 +322,8 @@ std::int64_t samples_of(const std::vector<PlacedFile>& files) {
 
 bool wide(const std::vector<PlacedFile>& files, bool raw, const HeightReading& reading) {
     return std::any_of(files.begin(), files.end(), [&](const PlacedFile& f) {
-        return !fits_float32(f.info.type) || (!raw && units_of(f.info, f.where, reading) != HeightUnits{});
+        return !fits_float32(f.info.type) || f.datum_change ||
+               (!raw && units_of(f.info, f.where, reading) != HeightUnits{});
     });
 }
 

@@ -24,6 +24,9 @@ struct StackOptions {
     OpenOptions open;
     HeightReading heights;  ///< of a height stack
     std::string temporary;  ///< what the names of temporary files begin with
+    /// Of the pixels that may wait in a temporary file so many wait in memory. 16384 pixels that lean by 2 degrees
+    /// against the grid are 43 MB for a band of 64 rows; with less they are written and read again. Of image stacks.
+    std::int64_t spool_memory_bytes = std::int64_t{128} << 20;
 };
 
 /// What a long reading calls now and then with the samples read since the last call; false stops it
@@ -126,8 +129,9 @@ public:
     Result<void> sample(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
                         std::span<std::uint32_t> out) const;
 
-    /// Memory that bands of 64 grid rows take, each prepared when the one before it is released, `points_wide` across:
-    /// pixels that wait and decoders' bands, without what sample() takes on each thread.
+    /// Memory that bands of 64 grid rows take, each prepared when the one before it is released: pixels that wait and
+    /// decoders' bands, without what sample() takes on each thread. Files are decoded in their whole width, however
+    /// wide the bands are.
     static std::int64_t bytes_needed(const std::vector<PlacedFile>& files, const std::vector<Layer>& layers,
                                      const TargetGrid& grid, const Crs& grid_crs, std::int64_t points_wide);
     /// Temporary disk at most.

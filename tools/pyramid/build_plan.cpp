@@ -54,8 +54,8 @@ bool north_up(const Georeference& where) { return where.axis_aligned() && where.
 // Files that are read straight through, row by row, need no copy.
 void choose_ways(BuildPlan& plan) {
     const MosaicPlan& m = plan.mosaic;
-    plan.heights_in_place =
-        m.base_shift == 0 && m.heights.size() == 1 && m.heights_copied && north_up(m.heights.front().where);
+    plan.heights_in_place = m.base_shift == 0 && m.heights.size() == 1 && m.heights_copied && m.same_units &&
+                             north_up(m.heights.front().where);
     plan.integer_heights =
         m.heights_copied && m.same_units &&
         std::all_of(m.heights.begin(), m.heights.end(), [](const PlacedFile& f) { return is_integer(f.info.type); });
@@ -165,15 +165,23 @@ std::vector<std::size_t> canonical_order(const std::vector<PlacedFile>& files, c
     return order;
 }
 
-// Of each file: what its layer's samples are counted from.
-std::vector<std::string> layer_names(std::size_t files, const std::vector<Layer>& layers) {
-    std::vector<std::string> names(files);
+// Of each file: what its layer's samples are counted from, and which of its sides are the layer's, where resampling ends
+// otherwise than at a neighbour without samples (SourceRecord::layer).
+std::vector<std::string> layer_names(const std::vector<PlacedFile>& files, const std::vector<Layer>& layers,
+                                     const Crs& crs) {
+    std::vector<std::string> names(files.size());
     for (const Layer& layer : layers) {
         const Georeference& w = layer.where;
         const std::string grid = fmt::format("{}|{}|{}|{}|{}|{}|{}", w.first_x, w.first_y, w.column_x, w.column_y,
                                              w.row_x, w.row_y, layer.half_sample_rim);
-        for (const LayerMember& member : layer.members)
-            names[member.file] = fmt::format("{:016x}", fingerprint_of_bytes(grid));
+        for (const LayerMember& member : layer.members) {
+            const PlacedFile& f = files[member.file];
+            const unsigned sides = (member.column == 0 ? kWestSide : 0u) | (member.row == 0 ? kNorthSide : 0u) |
+                                   (member.column + f.info.width == layer.columns ? kEastSide : 0u) |
+                                   (member.row + f.info.height == layer.rows ? kSouthSide : 0u);
+            const unsigned straight = north_up(w) && layer.crs.same_as(crs) ? kStraight : 0u;
+            names[member.file] = fmt::format("{:016x}{:02x}", fingerprint_of_bytes(grid), sides | straight);
+        }
     }
     return names;
 }
@@ -224,7 +232,7 @@ Result<BuildPlan> plan_build(const BuildOptions& o) {
                                                  std::tuple(&m.imagery, &m.image_layers, "imagery")}) {
         auto boxes = boxes_of(*files, m.crs);
         if (!boxes) return boxes.error();
-        const std::vector<std::string> layers = layer_names(files->size(), *layers_of);
+        const std::vector<std::string> layers = layer_names(*files, *layers_of, m.crs);
         for (const std::size_t k : canonical_order(*files, *boxes)) {
             SourceRecord record = source_record((*files)[k].path, role, (*files)[k].info);
             const PlaneBox& b = (*boxes)[k];

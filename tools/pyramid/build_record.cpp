@@ -52,8 +52,8 @@ std::optional<int> parse_int(const std::string& text) {
 // Each sets its option from the text; false: it makes no sense.
 using Setter = std::function<bool(const std::string& text, BuildOptions& options)>;
 
-template <class T>
-Setter number(T BuildOptions::*field) {
+template <class T, class Base>
+Setter number(T Base::*field) {
     return [field](const std::string& text, BuildOptions& o) {
         const auto v = parse_number(text);
         if (v) o.*field = *v;
@@ -67,7 +67,8 @@ Setter size(int BuildOptions::*field) {
         return v.has_value();
     };
 }
-Setter words(std::optional<std::string> BuildOptions::*field) {
+template <class Base>
+Setter words(std::optional<std::string> Base::*field) {
     return [field](const std::string& text, BuildOptions& o) {
         o.*field = text;
         return true;
@@ -113,6 +114,7 @@ const std::map<std::string, Setter>& setters() {
         {"spacing", number<std::optional<double>>(&BuildOptions::spacing_m)},
         {"height-scale", number<std::optional<double>>(&BuildOptions::height_scale)},
         {"height-offset", number<double>(&BuildOptions::height_offset_m)},
+        {"vertical-crs", words(&BuildOptions::vertical_crs)},
         {"nodata", number<std::optional<double>>(&BuildOptions::nodata)},
         {"height-quantum", number<std::optional<double>>(&BuildOptions::height_quantum_m)},
         {"bands", set_bands},
@@ -121,6 +123,12 @@ const std::map<std::string, Setter>& setters() {
          [](const std::string& text, BuildOptions& o) {
              o.colours.nodata = parse_number(text);
              return o.colours.nodata.has_value();
+         }},
+        {"texture-quality",
+         [](const std::string& text, BuildOptions& o) {
+             if (text != "high") return false;
+             o.texture_quality = TextureQuality::high;
+             return true;
          }},
         {"tile-size", size(&BuildOptions::tile_size)},
         {"texture-size", size(&BuildOptions::texture_size)},
@@ -150,6 +158,7 @@ std::map<std::string, std::string> options_record(const BuildOptions& o, const s
     };
     text("crs", o.crs);
     text("assume-crs", o.assume_crs);
+    text("vertical-crs", o.vertical_crs);
     if (o.assume_same_datum) record["assume-same-datum"] = "yes";
     for (const auto& [name, kernel] : kKernels)
         if (kernel == o.kernel && kernel != plain.kernel) record["resampling"] = name;
@@ -164,6 +173,7 @@ std::map<std::string, std::string> options_record(const BuildOptions& o, const s
         record["stretch"] =
             fmt::format("{}{},{}", stretch->spares_8bit ? kChosen : "", stretch->low, stretch->high);
     number("imagery-nodata", o.colours.nodata);
+    if (o.texture_quality == TextureQuality::high) record["texture-quality"] = "high";
     if (o.tile_size != plain.tile_size) record["tile-size"] = fmt::format("{}", o.tile_size);
     if (o.texture_size != plain.texture_size) record["texture-size"] = fmt::format("{}", o.texture_size);
     return record;

@@ -158,6 +158,7 @@ private:
         };
         job.imagery = imagery.get();
         job.writer = writer_.get();
+        job.quality = options_.texture_quality;
         job.stop = &stop_;
         TextureStage stage(std::move(job));
         rows_ = stage.district_rows();

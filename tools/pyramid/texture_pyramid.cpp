@@ -65,7 +65,7 @@ struct TexturePyramid::Impl {
             const std::int64_t count = std::min(kChunkBlocks, block_columns - from);
             encode_bc1_row(level.rows.data() + (row * 4 * level.width + from * 4) * 4,
                            static_cast<std::size_t>(level.width * 4), static_cast<std::size_t>(count),
-                           level.blocks.data() + ((first_row + row) * block_columns + from) * 8);
+                           level.blocks.data() + ((first_row + row) * block_columns + from) * 8, job.quality);
         });
     }
 
@@ -133,9 +133,9 @@ struct TexturePyramid::Impl {
         std::array<std::uint8_t, 64> repeated{};
         for (std::size_t t = 0; t < 16; ++t)
             std::memcpy(repeated.data() + 4 * t, two.data() + 4 * ((t / 4 % 2) * 2 + t % 2), 4);
-        encode_bc1_row(repeated.data(), 16, 1, tile.blocks.data() + bc1_mip_offset(log2, log2 - 1));
+        encode_bc1_row(repeated.data(), 16, 1, tile.blocks.data() + bc1_mip_offset(log2, log2 - 1), job.quality);
         for (std::size_t t = 0; t < 16; ++t) std::memcpy(repeated.data() + 4 * t, one.data(), 4);
-        encode_bc1_row(repeated.data(), 16, 1, tile.blocks.data() + bc1_mip_offset(log2, log2));
+        encode_bc1_row(repeated.data(), 16, 1, tile.blocks.data() + bc1_mip_offset(log2, log2), job.quality);
         return tile;
     }
 

@@ -23,6 +23,7 @@ struct TexturePyramidJob {
     int texture_size_log2 = 8;
     int deepest_level = 0;
     int root_level = 0;
+    TextureQuality quality = TextureQuality::normal;
     /// The rectangle, in tiles of root_level; cut to the data's extent.
     std::int64_t first_column = 0, first_row = 0, columns = kMaxCellsPerSide, rows = kMaxCellsPerSide;
     /// Tiles that are stored whatever they show, by address. Any thread.

@@ -118,6 +118,7 @@ Result<void> TextureStage::build_districts(std::int64_t first_column, std::int64
     job.first_row = first_row;
     job.columns = columns;
     job.rows = rows;
+    job.quality = job_.quality;
     job.stored = [&](TileId id) { return job_.index->stored(id); };
     job.shared_levels = job_.base.deepest_level;
     job.sink = [&](TileId id, std::vector<std::uint8_t> payload) { return sink(id, std::move(payload)); };
@@ -193,6 +194,7 @@ Result<void> TextureStage::build_crown() {
     const Dataset& d = job_.dataset;
     const int seeds = seed_level(d);
     if (seeds == 0) return {};
+    if (auto ok = job_.writer->flush(); !ok) return ok;
     const std::int64_t columns = district_columns(), rows = district_rows(), size = d.texture_size();
     std::vector<std::uint8_t> stored(static_cast<std::size_t>(columns * rows));
     std::vector<std::uint8_t> band(static_cast<std::size_t>(size * columns * size * 4));
@@ -201,6 +203,7 @@ Result<void> TextureStage::build_crown() {
     job.lattice = job_.base;
     job.texture_size_log2 = d.texture_size_log2;
     job.deepest_level = seeds - 1;
+    job.quality = job_.quality;
     job.stored = [&](TileId id) { return job_.index->stored(id); };
     job.shared_levels = job_.base.deepest_level;
     job.children_below = [&](TileId id) {

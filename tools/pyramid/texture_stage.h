@@ -29,6 +29,7 @@ struct TextureStageJob {
     HeightRowReader heights;
     ImageStack* imagery = nullptr;  ///< on texel_grid; null: a tint
     TileWriter* writer = nullptr;   ///< takes textures and seeds
+    TextureQuality quality = TextureQuality::normal;
     /// Finds seeds that the writer does not have (those of districts that are not built again). Null: none.
     std::function<Result<bool>(std::int64_t key, TileRow& row)> other_seeds;
     std::function<void(std::int64_t texels)> on_texels;
@@ -45,7 +46,7 @@ public:
     /// Builds a rectangle of them and hands their seeds on. Imagery is asked for from north to south.
     Result<void> build_districts(std::int64_t first_column, std::int64_t first_row, std::int64_t columns,
                                  std::int64_t rows);
-    /// After all districts that change, their rows flushed.
+    /// After all districts that change.
     Result<void> build_crown();
 
     /// Bytes held, imagery aside, for so many texels side by side.

@@ -5,8 +5,10 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -252,6 +254,7 @@ private:
         job.heights = [&](TileId id, TileRow& row) { return read_heights(id, row); };
         job.imagery = imagery.get();
         job.writer = writer_.get();
+        job.quality = build_.texture_quality;
         job.other_seeds = [&](std::int64_t key, TileRow& row) -> Result<bool> {
             const TileId id = *tile_from_key(dataset_.lattice, key);
             if (dirty_.at(static_cast<std::size_t>(id.y * columns_ + id.x)) != 0) return false;  // it has none now
@@ -329,21 +332,41 @@ private:
             // What the user names is made again, whatever its fingerprint, which is of a part of the file.
             const bool named = std::find(named_.begin(), named_.end(), s.name) != named_.end() ||
                                std::find(options_.remove.begin(), options_.remove.end(), s.name) != options_.remove.end();
-            const bool same = std::any_of(other.sources.begin(), other.sources.end(), [&](const SourceRecord& o) {
-                return o.role == s.role && o.name == s.name && o.bytes == s.bytes && o.fingerprint == s.fingerprint &&
-                       o.layer == s.layer;
+            const auto same = std::find_if(other.sources.begin(), other.sources.end(), [&](const SourceRecord& o) {
+                return o.role == s.role && o.name == s.name && o.bytes == s.bytes && o.fingerprint == s.fingerprint;
             });
-            if (!same || named) mark_file(s);
+            if (named || same == other.sources.end())
+                mark_box(s, *s.box_m);
+            else if (same->layer != s.layer)
+                mark_sides(s, *same);
         }
     }
 
-    void mark_file(const SourceRecord& s) {
-        const TargetGrid grid = texel_grid(dataset_);
+    // The file is the same, its layer is not: all of it where samples are counted from elsewhere, else the sides that
+    // were the layer's, or are.
+    void mark_sides(const SourceRecord& s, const SourceRecord& other) {
         const auto [west, south, east, north] = *s.box_m;
-        // What a kernel reads around a point, in pixels; and what a curved edge may reach out between the points that
+        const std::size_t grid = s.layer.size() < 2 ? 0 : s.layer.size() - 2;
+        const auto digits = [&](const std::string& layer) {
+            return static_cast<unsigned>(std::strtoul(layer.c_str() + std::min(grid, layer.size()), nullptr, 16));
+        };
+        const unsigned mine = digits(s.layer), changed = mine ^ digits(other.layer);
+        if (s.layer.compare(0, grid, other.layer, 0, grid) != 0 || (mine & kStraight) == 0 || (changed & kStraight) != 0)
+            return mark_box(s, *s.box_m);
+        if ((changed & kWestSide) != 0) mark_box(s, {west, south, west, north});
+        if ((changed & kEastSide) != 0) mark_box(s, {east, south, east, north});
+        if ((changed & kNorthSide) != 0) mark_box(s, {west, north, east, north});
+        if ((changed & kSouthSide) != 0) mark_box(s, {west, south, east, south});
+    }
+
+    void mark_box(const SourceRecord& s, const std::array<double, 4>& box) {
+        const TargetGrid grid = texel_grid(dataset_);
+        const auto [west, south, east, north] = box;
+        const double wide = (*s.box_m)[2] - (*s.box_m)[0], high = (*s.box_m)[3] - (*s.box_m)[1];
+        // What a kernel reads around a point, in pixels; and what a curved side may reach out between the points that
         // the box was made of.
-        const double pixel = std::max((east - west) / static_cast<double>(s.width), (north - south) / static_cast<double>(s.height));
-        const double reach = 4 * std::max(pixel, grid.step_m) + 0.01 * std::max(east - west, north - south);
+        const double pixel = std::max(wide / static_cast<double>(s.width), high / static_cast<double>(s.height));
+        const double reach = 4 * std::max(pixel, grid.step_m) + 0.01 * std::max(wide, high);
         const auto texel = [&](double metres) { return static_cast<std::int64_t>(std::floor(metres / grid.step_m)); };
         mark({texel(west - reach - grid.x_m), texel(grid.y_m - north - reach), texel(east + reach - grid.x_m) + 1,
               texel(grid.y_m - south + reach) + 1});

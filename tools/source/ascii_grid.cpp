@@ -10,18 +10,15 @@
 
 #include "tools/source/grid_file.h"
 #include "tools/source/number_text.h"
+#include "tools/source/text_reader.h"
 
 namespace scree {
 namespace {
 
 constexpr std::size_t kHeaderBytes = 4096;  // ten lines of 40 are enough; writers of more have not been seen
-constexpr std::size_t kBufferBytes = std::size_t{1} << 18;
 constexpr std::size_t kMaxWordBytes = 512;  // the longest double written out in full has 327 characters
 constexpr std::int64_t kRowsPerMark = 256;
 constexpr int kInt32Digits = 9;
-
-// End-of-file marks of old systems count as space.
-bool is_space(char c) { return c == ' ' || (c >= '\t' && c <= '\r') || c == '\0' || c == '\x1A'; }
 
 struct Header {
     std::int64_t columns = 0;
@@ -119,69 +116,19 @@ Result<Header> read_header(const std::string& path, std::string_view text) {
     return header;
 }
 
-// Words of the file from some offset on, through one buffer.
-class WordReader {
-public:
-    explicit WordReader(const ByteFile& file) : file_(&file), buffer_(kBufferBytes) {}
-
-    void seek(std::int64_t offset) {
-        at_ = end_ = 0;
-        next_ = offset;
-    }
-
-    std::int64_t offset() const { return next_ - static_cast<std::int64_t>(end_ - at_); }
-
-    /// Empty at the end of the file. Valid until the next call.
-    Result<std::string_view> next() {
-        while (true) {
-            while (at_ < end_ && is_space(buffer_[at_])) ++at_;
-            std::size_t stop = at_;
-            while (stop < end_ && !is_space(buffer_[stop])) ++stop;
-            if (stop < end_ || next_ == file_->size()) {
-                const std::string_view word(buffer_.data() + at_, stop - at_);
-                at_ = stop;
-                return word;
-            }
-            if (stop - at_ > kMaxWordBytes)
-                return Error{ErrorCode::input,
-                             fmt::format("'{}...' is no number", std::string_view(buffer_.data() + at_, 20))};
-            if (auto filled = refill(); !filled) return filled.error();
-        }
-    }
-
-private:
-    Result<void> refill() {
-        std::memmove(buffer_.data(), buffer_.data() + at_, end_ - at_);
-        end_ -= at_;
-        at_ = 0;
-        const auto bytes = static_cast<std::size_t>(
-            std::min<std::int64_t>(file_->size() - next_, static_cast<std::int64_t>(buffer_.size() - end_)));
-        if (auto read = file_->read_at(next_, std::as_writable_bytes(std::span(buffer_.data() + end_, bytes))); !read)
-            return read;
-        end_ += bytes;
-        next_ += static_cast<std::int64_t>(bytes);
-        return {};
-    }
-
-    const ByteFile* file_;
-    std::vector<char> buffer_;
-    std::size_t at_ = 0, end_ = 0;  ///< what of the buffer is still to be read
-    std::int64_t next_ = 0;         ///< offset of the byte after the buffer
-};
-
 // Every value is an integer that fits an int32: nothing but digits, signs and space, no more than nine digits in a row.
 Result<bool> holds_only_integers(const ByteFile& file, std::int64_t first) {
-    std::vector<char> buffer(kBufferBytes);
+    std::vector<char> buffer(TextReader::kBufferBytes);
     int run = 0;
     for (std::int64_t at = first; at < file.size(); at += static_cast<std::int64_t>(buffer.size())) {
         buffer.resize(static_cast<std::size_t>(
-            std::min<std::int64_t>(file.size() - at, static_cast<std::int64_t>(kBufferBytes))));
+            std::min<std::int64_t>(file.size() - at, static_cast<std::int64_t>(TextReader::kBufferBytes))));
         if (auto read = file.read_at(at, std::as_writable_bytes(std::span(buffer))); !read)
             return unusable_grid(file.path(), read.error().message);
         for (const char c : buffer) {
             if (c >= '0' && c <= '9') {
                 if (++run > kInt32Digits) return false;
-            } else if (c == '-' || c == '+' || is_space(c)) {
+            } else if (c == '-' || c == '+' || is_text_space(c)) {
                 run = 0;
             } else {
                 return false;
@@ -216,7 +163,7 @@ std::optional<T> parse(std::string_view word) {
 class AsciiGridDecoder final : public PixelDecoder {
 public:
     AsciiGridDecoder(ByteFile file, const Header& header, SampleType type)
-        : file_(std::move(file)), words_(file_), marks_{static_cast<std::int64_t>(header.bytes)} {
+        : file_(std::move(file)), words_(file_, kMaxWordBytes), marks_{static_cast<std::int64_t>(header.bytes)} {
         layout_ = {header.columns, header.rows, 1, -1, type, 0};
         words_.seek(marks_[0]);
     }
@@ -257,7 +204,7 @@ private:
     template <class T>
     Result<void> read_values(std::byte* out) {
         for (std::int64_t column = 0; column < layout_.width; ++column) {
-            const Result<std::string_view> word = words_.next();
+            const Result<std::string_view> word = words_.take_run();
             if (!word) return word.error();
             if (word->empty())
                 return Error{ErrorCode::input, fmt::format("the file ends before row {}, column {}", row_, column)};
@@ -274,7 +221,7 @@ private:
 
     // One value too many: then ncols is wrong, and every row is sheared.
     Result<void> check_end() {
-        const Result<std::string_view> word = words_.next();
+        const Result<std::string_view> word = words_.take_run();
         if (!word) return word.error();
         if (word->empty()) return {};
         return Error{ErrorCode::input, fmt::format("'{}' follows the last of the {} x {} values its header promises",
@@ -282,7 +229,7 @@ private:
     }
 
     ByteFile file_;
-    WordReader words_;
+    TextReader words_;
     DecodedLayout layout_;
     std::vector<std::int64_t> marks_;  ///< offsets of rows 0, 256, 512...
     std::int64_t row_ = 0;             ///< the next row that words_ gives

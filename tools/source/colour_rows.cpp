@@ -1,7 +1,8 @@
 #include "tools/source/colour_rows.h"
 
+#include <tmmintrin.h>
+
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -72,25 +73,37 @@ std::vector<int> default_bands(int channels, int alpha_channel) {
     return bands;
 }
 
-// Four pixels of three words each way: what nearly all orthoimages are.
-void rgb_to_rgba(const std::uint8_t* from, std::int64_t width, std::uint8_t* out) {
-    std::int64_t column = 0;
-    if constexpr (std::endian::native == std::endian::little) {
-        constexpr std::uint32_t kOpaque = 0xFF000000u;
-        for (; column + 4 <= width; column += 4, from += 12, out += 16) {
-            std::uint32_t word[3];
-            std::memcpy(word, from, sizeof word);
-            const std::uint32_t pixel[4] = {word[0] | kOpaque, (word[0] >> 24 | word[1] << 8) | kOpaque,
-                                            (word[1] >> 16 | word[2] << 16) | kOpaque, word[2] >> 8 | kOpaque};
-            std::memcpy(out, pixel, sizeof pixel);
-        }
-    }
-    for (; column < width; ++column, from += 3, out += 4) {
+void rgb_to_rgba_plain(const std::uint8_t* from, std::int64_t width, std::uint8_t* out) {
+    for (std::int64_t column = 0; column < width; ++column, from += 3, out += 4) {
         out[0] = from[0];
         out[1] = from[1];
         out[2] = from[2];
         out[3] = 255;
     }
+}
+
+// Sixteen pixels of three words each way, by a shuffle that all but the oldest x86-64 have.
+__attribute__((target("ssse3"))) void rgb_to_rgba_shuffled(const std::uint8_t* from, std::int64_t width,
+                                                           std::uint8_t* out) {
+    const __m128i spread = _mm_setr_epi8(0, 1, 2, -1, 3, 4, 5, -1, 6, 7, 8, -1, 9, 10, 11, -1);
+    const __m128i opaque = _mm_set1_epi32(static_cast<int>(0xFF000000U));
+    std::int64_t column = 0;
+    for (; column + 16 <= width; column += 16, from += 48, out += 64) {
+        const auto* in = reinterpret_cast<const __m128i*>(from);
+        auto* to = reinterpret_cast<__m128i*>(out);
+        const __m128i a = _mm_loadu_si128(in), b = _mm_loadu_si128(in + 1), c = _mm_loadu_si128(in + 2);
+        _mm_storeu_si128(to, _mm_or_si128(_mm_shuffle_epi8(a, spread), opaque));
+        _mm_storeu_si128(to + 1, _mm_or_si128(_mm_shuffle_epi8(_mm_alignr_epi8(b, a, 12), spread), opaque));
+        _mm_storeu_si128(to + 2, _mm_or_si128(_mm_shuffle_epi8(_mm_alignr_epi8(c, b, 8), spread), opaque));
+        _mm_storeu_si128(to + 3, _mm_or_si128(_mm_shuffle_epi8(_mm_srli_si128(c, 4), spread), opaque));
+    }
+    rgb_to_rgba_plain(from, width - column, out);
+}
+
+// What nearly all orthoimages are.
+void rgb_to_rgba(const std::uint8_t* from, std::int64_t width, std::uint8_t* out) {
+    static const bool shuffles = __builtin_cpu_supports("ssse3") != 0;
+    shuffles ? rgb_to_rgba_shuffled(from, width, out) : rgb_to_rgba_plain(from, width, out);
 }
 
 }  // namespace

@@ -163,8 +163,15 @@ std::string wkt(PJ_CONTEXT* context, const PJ* object) {
     return again && proj::equivalent(context, again.get(), object) ? plain_wkt(context, again.get()) : std::string();
 }
 
-/// The vertical part's number, of a compound CRS that has one.
+/// The number of a compound CRS's vertical part, or of the three-dimensional geographic CRS that heights above an
+/// ellipsoid are of.
 std::string vertical_text(PJ_CONTEXT* context, const PJ* crs) {
+    if (proj_get_type(crs) == PJ_TYPE_GEOGRAPHIC_3D_CRS) return registered(context, crs);
+    if (proj_get_type(crs) == PJ_TYPE_PROJECTED_CRS) {
+        const Object base(proj_crs_get_geodetic_crs(context, crs));
+        const bool solid = base && proj_get_type(base.get()) == PJ_TYPE_GEOGRAPHIC_3D_CRS;
+        return solid ? registered(context, base.get()) : std::string();
+    }
     if (proj_get_type(crs) != PJ_TYPE_COMPOUND_CRS) return {};
     const Object part(proj_crs_get_sub_crs(context, crs, 1));
     const Object vertical = part ? proj::unbound(context, part.get()) : nullptr;

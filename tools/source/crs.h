@@ -21,13 +21,14 @@ public:
     /// That of files which name none: metres of their own, the same as itself and nothing else.
     static Crs unnamed_metres();
 
-    const std::string& text() const;      ///< "EPSG:n" where the registry knows it (exactly), else one-line WKT2
-    const std::string& name() const;      ///< for people
-    const std::string& vertical() const;  ///< "EPSG:n" of the vertical part of a compound CRS, else empty
-    bool geographic() const;              ///< units are degrees, in a few old CRS others (turn())
-    double turn() const;                  ///< of a geographic CRS: once around in its units, 360 for degrees; else 0
-    double metres_per_unit() const;       ///< of a projected CRS (1 for degrees)
-    bool east_north() const;              ///< its axes count to the east and north (or are polar), not to the west
+    const std::string& text() const;  ///< "EPSG:n" where the registry knows it (exactly), else one-line WKT2
+    const std::string& name() const;  ///< for people
+    const std::string& vertical()
+        const;                ///< "EPSG:n" of a compound CRS's vertical part, of a 3D one's ellipsoid; else empty
+    bool geographic() const;  ///< units are degrees, in a few old CRS others (turn())
+    double turn() const;      ///< of a geographic CRS: once around in its units, 360 for degrees; else 0
+    double metres_per_unit() const;  ///< of a projected CRS (1 for degrees)
+    bool east_north() const;         ///< its axes count to the east and north (or are polar), not to the west
     /// WKT 1 as ESRI writes it into .prj files and most programs read; empty where that cannot say the same.
     std::string esri_wkt() const;
     /// The same horizontal CRS, axis order and names aside.

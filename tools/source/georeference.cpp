@@ -24,6 +24,7 @@
 #include "tools/source/gdal_metadata.h"
 #include "tools/source/geotiff_crs.h"
 #include "tools/source/number_text.h"
+#include "tools/source/pam_file.h"
 #include "tools/source/projection_file.h"
 #include "tools/source/tiff_file.h"
 
@@ -268,7 +269,12 @@ Result<std::optional<Georeference>> read_georeference(const std::string& image_p
         Result<GeotiffTags> tags = read_geotiff_tags(image_path);
         if (!tags) return tags.error();
         Georeference reference = std::move(tags->reference);
-        if (!tags->has_transform) {
+        const Result<PamFile> pam = read_pam(image_path);
+        if (!pam) return pam.error();
+        if (reference.crs.empty()) reference.crs = pam->crs;
+        if (!tags->has_transform && pam->geotransform) {
+            if (auto placed = place_by(*pam, image_path, reference); !placed) return placed.error();
+        } else if (!tags->has_transform) {
             const Result<std::optional<Georeference>> world = read_world_file(image_path);
             if (!world) return world.error();
             if (!world->has_value()) {

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "tools/source/number_text.h"
+#include "tools/source/pam_file.h"
 #include "tools/source/projection_file.h"
 
 namespace scree {
@@ -81,13 +82,21 @@ Result<GridFile> open_found(ByteFile file, const Found& found) {
     }
 }
 
-// What the header leaves open, a world file and a projection file beside it may say.
+// What the header leaves open, an .aux.xml, a world file and a projection file beside it may say.
 Result<void> ask_sidecars(const std::string& path, GridFile& grid) {
+    const Result<PamFile> pam = read_pam(path);
+    if (!pam) return pam.error();
+    if (!grid.nodata) grid.nodata = pam->nodata;
+    if (!grid.georeference && pam->geotransform) {
+        grid.georeference.emplace();
+        if (auto placed = place_by(*pam, path, *grid.georeference); !placed) return placed;
+    }
     if (!grid.georeference) {
         Result<std::optional<Georeference>> world = read_world_file(path);
         if (!world) return world.error();
         grid.georeference = std::move(*world);
     }
+    if (grid.georeference && grid.georeference->crs.empty()) grid.georeference->crs = pam->crs;
     if (grid.georeference) return take_projection_file(path, *grid.georeference);
     return {};
 }

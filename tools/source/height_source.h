@@ -16,7 +16,8 @@ struct HeightReading {
     std::optional<double> spacing_m;     ///< for files without georeference; else the lattice's
     std::optional<double> height_scale;  ///< z = value * scale + offset; none: as the file says
     double height_offset_m = 0;
-    std::optional<double> nodata;  ///< besides the file's own tag
+    std::optional<double> nodata;             ///< besides the file's own tag
+    std::optional<std::string> vertical_crs;  ///< what heights stand above; files of another are converted
 };
 
 /// Errors: ErrorCode::usage, naming the option.

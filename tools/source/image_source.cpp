@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstring>
 #include <exception>
+#include <filesystem>
 #include <limits>
 #include <type_traits>
 #include <utility>
@@ -17,6 +18,7 @@
 #include "tools/source/grid_file.h"
 #include "tools/source/image_header.h"
 #include "tools/source/isolated_decoder.h"
+#include "tools/source/pam_file.h"
 #include "tools/source/pixel_decoder.h"
 #include "tools/source/sample_memory.h"
 
@@ -253,16 +255,6 @@ private:
     int shift_ = 0;
 };
 
-Result<std::unique_ptr<ImageSource>> open_grid(const std::string& path, GridFile grid, const OpenOptions& options) {
-    ImageHeader header;
-    header.rows_per_strip = grid.rows_per_unit;
-    header.nodata = std::move(grid.nodata);
-    auto source = std::make_unique<DecodedSource>(path, header, decode_here(std::move(grid.decoder)));
-    if (Result<void> prepared = source->prepare(options); !prepared) return prepared.error();
-    source->place(std::move(grid.georeference));
-    return std::unique_ptr<ImageSource>(std::move(source));
-}
-
 // Whole frames take several times their size while they are decoded.
 DecoderLimits limits_of(const OpenOptions& options) {
     DecoderLimits limits;
@@ -271,11 +263,41 @@ DecoderLimits limits_of(const OpenOptions& options) {
     return limits;
 }
 
+// FILE.msk, as GDAL writes it for formats without masks of their own: a TIFF of the image's size whose samples are 0
+// where there is nothing. Source: GDAL RFC 15.
+Result<void> open_mask_beside(const std::string& path, const OpenOptions& options, DecodedSource& source) {
+    const std::string name = path + ".msk";
+    std::error_code ignored;
+    if (!std::filesystem::is_regular_file(name, ignored)) return {};
+    const auto explained = [&](const Error& error) {
+        return Error{error.code, fmt::format("{}; it is the mask of {}: without it take it away", error.message, path)};
+    };
+    const DecoderLimits limits = limits_of(options);
+    if (Result<void> tried = try_headers(name, limits); !tried) return explained(tried.error());
+    Result<ImageHeader> header = read_image_header(name);
+    if (!header) return explained(header.error());
+    if (!header->plain_tiff) return explained(unusable(name, "no TIFF"));
+    Result<std::unique_ptr<BandDecoder>> decoder = open_isolated_decoder(name, *header, limits);
+    if (!decoder) return explained(decoder.error());
+    return source.use_mask(*header, std::move(*decoder), options);
+}
+
+Result<std::unique_ptr<ImageSource>> open_grid(const std::string& path, GridFile grid, const OpenOptions& options) {
+    ImageHeader header;
+    header.rows_per_strip = grid.rows_per_unit;
+    header.nodata = std::move(grid.nodata);
+    auto source = std::make_unique<DecodedSource>(path, header, decode_here(std::move(grid.decoder)));
+    if (Result<void> prepared = source->prepare(options); !prepared) return prepared.error();
+    if (Result<void> masked = open_mask_beside(path, options, *source); !masked) return masked.error();
+    source->place(std::move(grid.georeference));
+    return std::unique_ptr<ImageSource>(std::move(source));
+}
+
 Result<void> open_mask(const std::string& path, const ImageHeader& image, const OpenOptions& options,
                        DecodedSource& source) {
     Result<std::optional<ImageHeader>> header = read_mask_header(path, image);
     if (!header) return header.error();
-    if (!*header) return {};
+    if (!*header) return open_mask_beside(path, options, source);
     Result<std::unique_ptr<BandDecoder>> decoder = open_isolated_decoder(path, **header, limits_of(options));
     if (!decoder) return decoder.error();
     return source.use_mask(**header, std::move(*decoder), options);
@@ -299,6 +321,11 @@ Result<std::unique_ptr<ImageSource>> open_image(const std::string& path, const O
                     "the whole image, {} x {} samples, must be decoded at once, but {} MiB may be held; give --memory "
                     "at least {} MiB for it, or store the file in tiles",
                     header->width, header->height, options.max_unit_bytes / kMiB, least / kMiB + 1));
+    }
+    if (!header->nodata) {
+        Result<PamFile> pam = read_pam(path);
+        if (!pam) return pam.error();
+        header->nodata = std::move(pam->nodata);
     }
     Result<std::unique_ptr<BandDecoder>> decoder = open_isolated_decoder(path, *header, limits);
     if (!decoder) return decoder.error();

@@ -65,9 +65,13 @@ public:
     /// again.
     virtual Result<void> read_channel(std::int64_t row_begin, std::int64_t row_end, std::span<float> out) = 0;
     virtual Result<void> read_channel(std::int64_t row_begin, std::int64_t row_end, std::span<double> out) = 0;
-    /// Rows as 8-bit RGBA by ColourReading (colour_reading.h). Grey is replicated; without a stretch 16-bit integers
-    /// and floats are scaled to 0..255 by the type's range, float 0..1. Colours come out unassociated. Alpha is the
-    /// file's (255 without any), and 0 where mask, nodata or NaN say that there is nothing.
+    /// What rows cost that are not the next ones: TIFFs, raw grids and fixed-record DEMs decode the strip group (1 MiB)
+    /// or row of tiles that holds them. PNG, JPEG and the like decode all rows above them again when going back, and
+    /// skip by decoding when going forward. Formats that are decoded whole (unit_rows is the height: JPEG 2000,
+    /// interlaced PNG, most WebP) hold the frame while open: any order is cheap. Rows as 8-bit RGBA by ColourReading
+    /// (colour_reading.h). Grey is replicated; without a stretch 16-bit integers and floats are scaled to 0..255 by the
+    /// type's range, float 0..1. Colours come out unassociated. Alpha is the file's (255 without any), and 0 where
+    /// mask, nodata or NaN say that there is nothing.
     virtual Result<void> read_rgba8(std::int64_t row_begin, std::int64_t row_end, std::span<std::uint8_t> out) = 0;
     /// Rows of the shown bands before any stretch, info().shown_bands values a pixel, all NaN where it is transparent.
     /// For choose_stretch, so not of eight_bit images; sources that are made for something else need not have it.

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -195,16 +196,19 @@ void read_esri_type(HeaderReader& header, bool gridfloat, const std::optional<st
 
 std::optional<Georeference> esri_place(HeaderReader& header, std::int64_t rows) {
     const std::optional<double> cell = header.number("cellsize");
-    const std::optional<double> step_x = header.text("xdim") ? header.number("xdim") : cell;
-    const std::optional<double> step_y = header.text("ydim") ? header.number("ydim") : cell;
+    const auto step = [&](const char* key, const char* other_key) {
+        if (header.text(key)) return header.number(key);
+        return header.text(other_key) ? header.number(other_key) : cell;
+    };
+    const std::optional<double> step_x = step("xdim", "dx"), step_y = step("ydim", "dy");
     const auto ul_x = header.number("ulxmap");
     const auto ul_y = header.number("ulymap");
     const auto corner_x = header.number("xllcorner");
     const auto corner_y = header.number("yllcorner");
     const auto centre_x = header.number("xllcenter");
     const auto centre_y = header.number("yllcenter");
-    for (const auto& step : {step_x, step_y})
-        if (step && !(*step > 0)) header.complain(fmt::format("the distance of samples is {}", *step));
+    for (const auto& distance : {step_x, step_y})
+        if (distance && !(*distance > 0)) header.complain(fmt::format("the distance of samples is {}", *distance));
     Georeference place;
     place.column_x = step_x.value_or(1);
     place.row_y = -step_y.value_or(1);
@@ -303,6 +307,21 @@ std::string envi_crs(const std::vector<std::string>& map_info) {
     return {};
 }
 
+// "rotation=30" among the parts: counter-clockwise.
+double envi_rotation_deg(const std::vector<std::string>& parts, HeaderReader& header) {
+    double angle = 0;
+    for (const std::string& part : parts) {
+        if (!lower_case(part).starts_with("rotation")) continue;
+        const std::size_t equals = part.find('=');
+        const auto number = parse_number(equals == std::string::npos ? "" : part.substr(equals + 1));
+        if (number && std::abs(*number) <= 360)
+            angle = *number;
+        else
+            header.complain(fmt::format("map info's '{}' is no angle", part.substr(0, 40)));
+    }
+    return angle;
+}
+
 // map info = {projection, column, row, x, y, step x, step y, ...}: place of a point given in columns and rows that
 // count from 1 at the outer edge of the first sample.
 std::optional<Georeference> envi_place(HeaderReader& header) {
@@ -319,17 +338,16 @@ std::optional<Georeference> envi_place(HeaderReader& header) {
         header.complain("map info lacks one of its six numbers");
         return std::nullopt;
     }
-    for (const std::string& part : parts) {
-        if (!lower_case(part).starts_with("rotation")) continue;
-        const std::size_t equals = part.find('=');
-        const auto angle = parse_number(equals == std::string::npos ? "" : part.substr(equals + 1));
-        if (!angle || *angle != 0) header.complain("map info is rotated, which is not read");
-    }
+    const double angle = envi_rotation_deg(parts, header) * std::numbers::pi / 180;
+    if (angle != 0 && numbers[4] != numbers[5])
+        header.complain("map info turns samples that are not square, and programs differ on what that means");
     Georeference place;
-    place.column_x = numbers[4];
-    place.row_y = -numbers[5];
-    place.first_x = numbers[2] + (1.5 - numbers[0]) * place.column_x;
-    place.first_y = numbers[3] + (1.5 - numbers[1]) * place.row_y;
+    place.column_x = numbers[4] * std::cos(angle);
+    place.column_y = numbers[4] * std::sin(angle);
+    place.row_x = numbers[5] * std::sin(angle);
+    place.row_y = -numbers[5] * std::cos(angle);
+    place.first_x = numbers[2] + (1.5 - numbers[0]) * place.column_x + (1.5 - numbers[1]) * place.row_x;
+    place.first_y = numbers[3] + (1.5 - numbers[0]) * place.column_y + (1.5 - numbers[1]) * place.row_y;
     place.crs = header.text("coordinate system string").value_or(envi_crs(parts));
     place.crs_name = parts[0];
     place.geographic = lower_case(parts[0]).starts_with("geographic");

@@ -280,6 +280,97 @@ private:
     WholeTaps column_taps_, row_taps_;
 };
 
+/// Four points at fractions (0..kBilinearOne) between their pixels, the upper left one of which is above[offset(n)];
+/// false where a pixel is not opaque.
+template <class Offset>
+bool four_bilinear(const std::uint32_t* above, std::int64_t pitch, Offset offset, __m128i across, __m128i down,
+                   std::uint32_t* out) {
+    const __m128i one = _mm_set1_epi32(kBilinearOne), half = _mm_set1_epi32(kBilinearOne / 2);
+    const __m128i w11 = _mm_srli_epi32(_mm_add_epi32(_mm_madd_epi16(across, down), half), kBilinearBits);
+    const __m128i w10 = _mm_sub_epi32(across, w11), w01 = _mm_sub_epi32(down, w11);
+    const __m128i w00 = _mm_sub_epi32(_mm_sub_epi32(one, across), w01);
+    const __m128i left = _mm_or_si128(w00, _mm_slli_epi32(w01, 16)), right = _mm_or_si128(w10, _mm_slli_epi32(w11, 16));
+    __m128i both = _mm_set1_epi32(-1);
+    const auto point = [&](std::size_t n, __m128i left_weights, __m128i right_weights) {
+        const std::uint32_t* at = above + offset(n);
+        const __m128i upper = two_pixels(at), lower = two_pixels(at + pitch), zero = _mm_setzero_si128();
+        both = _mm_and_si128(both, _mm_and_si128(upper, lower));
+        // The channels of one above and one below side by side, of the left two, then of the right two.
+        const __m128i four = _mm_unpacklo_epi8(upper, lower);
+        const __m128i sum = _mm_add_epi32(_mm_madd_epi16(_mm_unpacklo_epi8(four, zero), left_weights),
+                                          _mm_madd_epi16(_mm_unpackhi_epi8(four, zero), right_weights));
+        return _mm_srli_epi32(_mm_add_epi32(sum, half), kBilinearBits);
+    };
+    const __m128i p0 = point(0, _mm_shuffle_epi32(left, 0x00), _mm_shuffle_epi32(right, 0x00));
+    const __m128i p1 = point(1, _mm_shuffle_epi32(left, 0x55), _mm_shuffle_epi32(right, 0x55));
+    const __m128i p2 = point(2, _mm_shuffle_epi32(left, 0xAA), _mm_shuffle_epi32(right, 0xAA));
+    const __m128i p3 = point(3, _mm_shuffle_epi32(left, 0xFF), _mm_shuffle_epi32(right, 0xFF));
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(out),
+                     _mm_packus_epi16(_mm_packs_epi32(p0, p1), _mm_packs_epi32(p2, p3)));
+    return all_opaque(set_upper(both));
+}
+
+/// Points along one axis of a window, four at a time.
+class FourPlaces {
+public:
+    FourPlaces(const Axis& axis, std::int64_t window_first, std::int64_t window_count)
+        : base_(_mm_set1_pd(fine(window_first))),
+          low_(_mm_set1_pd(std::max(0.0, 0.5 - fine(window_first)))),
+          limit_(_mm_set1_pd(std::min(fine(window_count - 1), fine(axis.last - window_first)))) {}
+
+    struct Places {
+        __m128i sample, fraction;  ///< samples counted from the window's first
+        bool inside;               ///< all four lie between samples of the raster that the window has
+    };
+    /// As bilinear_place: to count from the window's first sample changes no digit.
+    Places operator()(const double* at) const {
+        int inside = 3;
+        const __m128i places = _mm_unpacklo_epi64(two(at, inside), two(at + 2, inside));
+        return {_mm_srli_epi32(places, kBilinearBits),
+                _mm_and_si128(places, _mm_set1_epi32(static_cast<int>(kBilinearOne - 1))), inside == 3};
+    }
+
+private:
+    static double fine(std::int64_t sample) { return static_cast<double>(sample * kBilinearOne); }
+    __m128i two(const double* at, int& inside) const {
+        const __m128d one = _mm_set1_pd(static_cast<double>(kBilinearOne));
+        const __m128d scaled = _mm_add_pd(_mm_mul_pd(_mm_loadu_pd(at), one), _mm_set1_pd(0.5));
+        const __m128d place = _mm_sub_pd(scaled, base_);
+        inside &= _mm_movemask_pd(_mm_and_pd(_mm_cmpge_pd(place, low_), _mm_cmplt_pd(place, limit_)));
+        return _mm_cvttpd_epi32(place);
+    }
+
+    __m128d base_, low_, limit_;
+};
+
+/// Windows whose places in 2^-12 samples fit 31 bits, and rasters that have pairs.
+bool fits_fours(const ColourSampler& sampler, const SampleWindow<std::uint32_t>& window) {
+    constexpr std::int64_t kMostSide = std::int64_t{1} << 18;
+    return sampler.columns().last >= 1 && sampler.rows().last >= 1 && window.columns >= 2 && window.rows >= 2 &&
+           window.columns <= kMostSide && window.rows <= kMostSide;
+}
+
+void bilinear_points(ColourSampler& sampler, const SampleWindow<std::uint32_t>& window, const SourcePoints& points,
+                     std::span<std::uint32_t> out) {
+    const FourPlaces columns(sampler.columns(), window.first_column, window.columns),
+        rows(sampler.rows(), window.first_row, window.rows);
+    const std::uint32_t* pixels = window.values.data();
+    std::size_t k = 0;
+    for (; k + 4 <= out.size(); k += 4) {
+        const auto c = columns(&points.column[k]), r = rows(&points.row[k]);
+        bool done = false;
+        if (c.inside && r.inside) {
+            alignas(16) std::array<std::int32_t, 4> column, row;
+            _mm_store_si128(reinterpret_cast<__m128i*>(column.data()), c.sample);
+            _mm_store_si128(reinterpret_cast<__m128i*>(row.data()), r.sample);
+            const auto offset = [&](std::size_t n) { return row[n] * window.columns + column[n]; };
+            done = four_bilinear(pixels, window.columns, offset, c.fraction, r.fraction, &out[k]);
+        }
+        for (std::size_t n = k; n < k + 4 && !done; ++n) out[n] = sampler.at(points.column[n], points.row[n]);
+    }
+    for (; k < out.size(); ++k) out[k] = sampler.at(points.column[k], points.row[k]);
+}
+
 // --- points in lines ---
 
 /// The columns of points that all rows of them have, relative to the window.
@@ -307,44 +398,10 @@ struct BilinearColumns {
     }
 };
 
-struct BilinearRow {
-    const std::uint32_t *above, *below;
-    std::int32_t fraction;
-};
-
-/// Four points; false where one of their pixels is not opaque.
-bool four_bilinear(const BilinearColumns& columns, std::size_t k, const BilinearRow& row, std::uint32_t* out) {
-    const __m128i one = _mm_set1_epi32(kBilinearOne), half = _mm_set1_epi32(kBilinearOne / 2);
-    const __m128i f = _mm_loadu_si128(reinterpret_cast<const __m128i*>(&columns.fraction[k]));
-    const __m128i g = _mm_set1_epi32(row.fraction);
-    const __m128i w11 = _mm_srli_epi32(_mm_add_epi32(_mm_madd_epi16(f, g), half), kBilinearBits);
-    const __m128i w10 = _mm_sub_epi32(f, w11), w01 = _mm_sub_epi32(g, w11);
-    const __m128i w00 = _mm_sub_epi32(_mm_sub_epi32(one, f), w01);
-    const __m128i upper = _mm_or_si128(w00, _mm_slli_epi32(w10, 16)),
-                  lower = _mm_or_si128(w01, _mm_slli_epi32(w11, 16));
-    __m128i both = _mm_set1_epi32(-1);
-    const auto point = [&](std::size_t n, __m128i upper_weights, __m128i lower_weights) {
-        const std::int32_t c = columns.sample[k + n];
-        const __m128i above = two_pixels(row.above + c), below = two_pixels(row.below + c);
-        both = _mm_and_si128(both, _mm_and_si128(above, below));
-        const __m128i sum =
-            _mm_add_epi32(_mm_madd_epi16(paired(above), upper_weights), _mm_madd_epi16(paired(below), lower_weights));
-        return _mm_srli_epi32(_mm_add_epi32(sum, half), kBilinearBits);
-    };
-    const __m128i p0 = point(0, _mm_shuffle_epi32(upper, 0x00), _mm_shuffle_epi32(lower, 0x00));
-    const __m128i p1 = point(1, _mm_shuffle_epi32(upper, 0x55), _mm_shuffle_epi32(lower, 0x55));
-    const __m128i p2 = point(2, _mm_shuffle_epi32(upper, 0xAA), _mm_shuffle_epi32(lower, 0xAA));
-    const __m128i p3 = point(3, _mm_shuffle_epi32(upper, 0xFF), _mm_shuffle_epi32(lower, 0xFF));
-    _mm_storeu_si128(reinterpret_cast<__m128i*>(out),
-                     _mm_packus_epi16(_mm_packs_epi32(p0, p1), _mm_packs_epi32(p2, p3)));
-    return all_opaque(set_upper(both));
-}
-
 bool bilinear_lines(ColourSampler& sampler, const SampleWindow<std::uint32_t>& window, const SourceLines& lines,
                     std::uint32_t* out) {
     BilinearColumns columns;
-    if (sampler.columns().last < 1 || sampler.rows().last < 1 || !columns.set(sampler.columns(), lines.column, window))
-        return false;
+    if (!fits_fours(sampler, window) || !columns.set(sampler.columns(), lines.column, window)) return false;
     const std::size_t count = lines.column.size();
     for (const double v : lines.row) {
         if (!sampler.rows().holds(v)) {
@@ -356,12 +413,15 @@ bool bilinear_lines(ColourSampler& sampler, const SampleWindow<std::uint32_t>& w
         const std::int64_t r = place.sample - window.first_row;
         if (r < 0 || r + 2 > window.rows) return false;
         const std::uint32_t* above = window.values.data() + r * window.columns;
-        const BilinearRow row{above, above + window.columns, static_cast<std::int32_t>(place.fraction)};
+        const __m128i down = _mm_set1_epi32(static_cast<int>(place.fraction));
         std::array<std::uint32_t, 4> rest;
         for (std::size_t k = 0; k < count; k += 4) {
             const std::size_t n = std::min<std::size_t>(4, count - k);
             std::uint32_t* to = n == 4 ? out + k : rest.data();
-            if (!four_bilinear(columns, k, row, to))
+            const __m128i across = _mm_loadu_si128(reinterpret_cast<const __m128i*>(&columns.fraction[k]));
+            const std::int32_t* sample = &columns.sample[k];
+            if (!four_bilinear(
+                    above, window.columns, [&](std::size_t m) { return sample[m]; }, across, down, to))
                 for (std::size_t m = 0; m < n; ++m) to[m] = sampler.at(lines.column[k + m], v);
             if (n < 4) std::copy_n(rest.data(), n, out + k);
         }
@@ -499,6 +559,8 @@ void resample_colours(const SampleWindow<std::uint32_t>& window, const SourcePoi
                       std::span<std::uint32_t> out) {
     assert(points.column.size() == out.size() && points.row.size() == out.size());
     ColourSampler sampler(window, rule);
+    if (sampler.way() == ColourSampler::Way::bilinear && fits_fours(sampler, window))
+        return bilinear_points(sampler, window, points, out);
     for (std::size_t k = 0; k < out.size(); ++k) out[k] = sampler.at(points.column[k], points.row[k]);
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <limits>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -109,11 +110,19 @@ private:
         const int channels = plain_.separate_planes ? 1 : plain_.channels;
         const int bits = plain_.rgba_by_libtiff ? 8 : plain_.bits;
         const auto unit_row_bytes = static_cast<std::size_t>((unit_columns * channels * bits + 7) / 8);
+        if (!tiled && planes == 1 && stored_as_handed_out()) {
+            // Uncompressed strips go from the file to where they belong without another copy.
+            const Result<bool> written = read_unit({0, static_cast<std::uint32_t>(row), rows, 0},
+                                                   {out, unit_row_bytes * static_cast<std::size_t>(rows)});
+            if (!written) return written.error();
+            if (!*written) fill_samples(out, rows * layout_.width * channels);
+            return {};
+        }
         unit_.resize(unit_row_bytes * static_cast<std::size_t>(unit_rows));
         for (int plane = 0; plane < planes; ++plane) {
             for (std::int64_t column = 0; column < layout_.width; column += unit_columns) {
                 const Unit unit{static_cast<std::uint32_t>(column), static_cast<std::uint32_t>(row), unit_rows, plane};
-                Result<bool> written = read_unit(unit);
+                Result<bool> written = read_unit(unit, unit_);
                 if (!written) return written.error();
                 const std::int64_t columns = std::min(unit_columns, layout_.width - column);
                 for (std::int64_t r = 0; r < rows; ++r) {
@@ -131,6 +140,11 @@ private:
         return {};
     }
 
+    bool stored_as_handed_out() const {
+        return !plain_.rgba_by_libtiff && plain_.type != SampleType::f16 &&
+               static_cast<std::size_t>(plain_.bits) == out_bytes_ * 8;
+    }
+
     struct Unit {
         std::uint32_t column, row;
         std::int64_t rows;  ///< of the tile; of a strip those that the image has
@@ -138,7 +152,7 @@ private:
     };
 
     // False: the unit was never written, so it has neither place nor length.
-    Result<bool> read_unit(const Unit& unit) {
+    Result<bool> read_unit(const Unit& unit, std::span<std::byte> to) {
         TIFF* tiff = file_->get();
         const bool tiled = plain_.tile_width > 0;
         const auto plane = static_cast<std::uint16_t>(unit.plane);
@@ -146,10 +160,10 @@ private:
             tiled ? TIFFComputeTile(tiff, unit.column, unit.row, 0, plane) : TIFFComputeStrip(tiff, unit.row, plane);
         if (TIFFGetStrileByteCount(tiff, index) == 0 && TIFFGetStrileOffset(tiff, index) == 0) return false;
         file_->clear_messages();
-        const auto size = static_cast<tmsize_t>(unit_.size());
+        const auto size = static_cast<tmsize_t>(to.size());
         const tmsize_t read = plain_.rgba_by_libtiff ? read_rgba(unit)
-                              : tiled                ? TIFFReadEncodedTile(tiff, index, unit_.data(), size)
-                                                     : TIFFReadEncodedStrip(tiff, index, unit_.data(), size);
+                              : tiled                ? TIFFReadEncodedTile(tiff, index, to.data(), size)
+                                                     : TIFFReadEncodedStrip(tiff, index, to.data(), size);
         if (read != size || !file_->messages().empty()) {
             const std::string reason =
                 file_->messages().empty() ? fmt::format("{} of {} bytes", read, size) : file_->messages();
@@ -198,7 +212,7 @@ private:
                 const float wide = stored;
                 std::memcpy(to, &wide, sizeof wide);
             }
-        } else if (static_cast<std::size_t>(plain_.bits) != out_bytes_ * 8) {
+        } else if (!stored_as_handed_out()) {
             unpack(from, to, count);
         } else if (step == out_bytes_) {
             std::memcpy(to, from, static_cast<std::size_t>(count) * out_bytes_);

@@ -10,6 +10,8 @@
 
 #include "tools/source/grid_file.h"
 #include "tools/source/number_text.h"
+#include "tools/source/state_plane.h"
+#include "tools/source/text_reader.h"
 
 namespace scree {
 namespace {
@@ -22,8 +24,7 @@ constexpr std::size_t kFloatBytes = 12;
 constexpr std::size_t kHeadBytes = 3 * kIntegerBytes + 5 * kDoubleBytes;  // of a profile, after its row number
 constexpr std::int64_t kFirstBlockValues = 146;                           // that fit a record after the head
 constexpr std::int64_t kBlockValues = 170;
-constexpr std::size_t kBufferBytes = std::size_t{1} << 18;
-constexpr std::size_t kMaxRunBytes = kBufferBytes / 4;
+constexpr std::size_t kMaxRunBytes = TextReader::kBufferBytes / 4;
 constexpr std::int64_t kMaxSamples = std::int64_t{1} << 26;  // 40 times those of a 10 m quad
 constexpr std::int64_t kMaxColumnStep = 16;  // some missing profiles are a hole, more are a damaged coordinate
 constexpr double kGridTolerance = 0.1;       // of a step that profiles may start beside the grid
@@ -31,9 +32,6 @@ constexpr double kMaxHeightStep = 1e6;       // so that 999999 of them fit a flo
 constexpr double kMaxLocalDatum = 1e9;
 constexpr std::int32_t kVoid = -32767;
 constexpr std::int32_t kOtherVoid = -32766;
-
-bool is_space(char c) { return c == ' ' || (c >= '\t' && c <= '\r') || c == '\0' || c == '\x1A'; }
-bool is_line_end(char c) { return c == '\n' || c == '\r'; }
 
 Error broken(std::string reason) { return {ErrorCode::input, std::move(reason)}; }
 
@@ -56,39 +54,25 @@ std::optional<double> number_at(std::string_view text, std::size_t at, std::size
     return fortran_number(text.substr(at, bytes));
 }
 
-// Fields of the file from some offset on, through one buffer. Errors hold the bare reason.
+// Fields of the file from some offset on. Errors hold the bare reason.
 class FieldReader {
 public:
-    explicit FieldReader(const ByteFile& file) : file_(&file), buffer_(kBufferBytes) {}
+    explicit FieldReader(const ByteFile& file) : text_(file, kMaxRunBytes) {}
 
     void seek(std::int64_t offset) {
         run_left_ = 0;
-        const std::int64_t buffered = next_ - static_cast<std::int64_t>(end_);
-        if (offset >= buffered && offset <= next_) {
-            at_ = static_cast<std::size_t>(offset - buffered);
-            return;
-        }
-        at_ = end_ = 0;
-        next_ = std::min(offset, file_->size());
+        text_.seek(offset);
     }
+    std::int64_t offset() const { return text_.offset(); }
 
-    std::int64_t offset() const { return next_ - static_cast<std::int64_t>(end_ - at_); }
-
-    /// The next `bytes`, fewer at the end of the file. Valid until the next call.
+    /// As TextReader's.
     Result<std::string_view> take(std::size_t bytes) {
         run_left_ = 0;
-        if (end_ - at_ < bytes)
-            if (auto filled = refill(); !filled) return filled.error();
-        const std::string_view taken(buffer_.data() + at_, std::min(bytes, end_ - at_));
-        at_ += taken.size();
-        return taken;
+        return text_.take(bytes);
     }
-
-    /// What stands between white space and white space; empty at the end of the file. Valid until the next call.
     Result<std::string_view> take_run() {
-        Result<std::string_view> run = find_run();
-        if (run) at_ += run->size();
-        return run;
+        run_left_ = 0;
+        return text_.take_run();
     }
 
     /// A right-aligned field of six. Records and lines may be padded or not, but within them a field ends six bytes
@@ -97,15 +81,15 @@ public:
         const std::int64_t due = offset() + static_cast<std::int64_t>(kIntegerBytes);
         bool new_line = false;
         if (run_left_ == 0) {
-            const Result<std::string_view> run = find_run(&new_line);
+            const Result<std::string_view> run = text_.find_run(&new_line);
             if (!run) return run.error();
             if (run->empty()) return broken("the file ends before it");
             run_left_ = run->size();
         }
         // Fields without space between them are full, but for the first.
         const std::size_t bytes = (run_left_ - 1) % kIntegerBytes + 1;
-        const std::string_view text(buffer_.data() + at_, bytes);
-        at_ += bytes;
+        const std::string_view text = text_.buffered().substr(0, bytes);
+        text_.skip(bytes);
         run_left_ -= bytes;
         std::int32_t value = 0;
         const char* first = text.data() + (text[0] == '+' ? 1 : 0);
@@ -118,38 +102,8 @@ public:
     }
 
 private:
-    Result<std::string_view> find_run(bool* new_line = nullptr) {
-        run_left_ = 0;
-        while (true) {
-            for (; at_ < end_ && is_space(buffer_[at_]); ++at_)
-                if (new_line != nullptr && is_line_end(buffer_[at_])) *new_line = true;
-            std::size_t stop = at_;
-            while (stop < end_ && !is_space(buffer_[stop])) ++stop;
-            if (stop - at_ > kMaxRunBytes)
-                return broken(fmt::format("'{}...' is no number", std::string_view(buffer_.data() + at_, 20)));
-            if (stop < end_ || next_ == file_->size()) return std::string_view(buffer_.data() + at_, stop - at_);
-            if (auto filled = refill(); !filled) return filled.error();
-        }
-    }
-
-    Result<void> refill() {
-        std::memmove(buffer_.data(), buffer_.data() + at_, end_ - at_);
-        end_ -= at_;
-        at_ = 0;
-        const auto bytes = static_cast<std::size_t>(
-            std::min<std::int64_t>(file_->size() - next_, static_cast<std::int64_t>(buffer_.size() - end_)));
-        if (auto read = file_->read_at(next_, std::as_writable_bytes(std::span(buffer_.data() + end_, bytes))); !read)
-            return read;
-        end_ += bytes;
-        next_ += static_cast<std::int64_t>(bytes);
-        return {};
-    }
-
-    const ByteFile* file_;
-    std::vector<char> buffer_;
-    std::size_t at_ = 0, end_ = 0;  ///< what of the buffer is still to be read
-    std::size_t run_left_ = 0;      ///< bytes of a run of fields, all of them buffered
-    std::int64_t next_ = 0;         ///< offset of the byte after the buffer
+    TextReader text_;
+    std::size_t run_left_ = 0;  ///< bytes of a run of fields, all of them buffered
 };
 
 enum class Unit { radians = 0, feet = 1, metres = 2, arc_seconds = 3 };
@@ -157,7 +111,8 @@ enum class Datum { nad27 = 1, wgs72 = 2, wgs84 = 3, nad83 = 4, other };
 
 struct Header {
     bool geographic = false;
-    std::int64_t zone = 0;  ///< of UTM, negative in the south
+    bool state_plane = false;
+    std::int64_t zone = 0;  ///< of UTM, negative in the south; of a state plane, by FIPS
     Unit ground = Unit::metres;
     Unit height = Unit::metres;
     double step_x = 0, step_y = 0, step_z = 0;
@@ -171,17 +126,17 @@ Result<void> read_system(const std::string& path, std::string_view record, Heade
     if (integer_at(record, 150) == 2)
         return unusable_grid(path, "its samples are scattered (pattern 2); only regular grids are read");
     const auto system = integer_at(record, 156);
-    if (system == 2)
-        return unusable_grid(
-            path, "it lies in a state plane system (ground reference system 2); only geographic and UTM ones are read");
-    if (system != 0 && system != 1)
+    if (system != 0 && system != 1 && system != 2)
         return unusable_grid(path,
                              fmt::format("no USGS DEM that can be read: its ground reference system is '{}', but 0 "
-                                         "(geographic) or 1 (UTM) are known",
+                                         "(geographic), 1 (UTM) and 2 (state plane) are known",
                                          record.substr(156, kIntegerBytes)));
     header.geographic = system == 0;
+    header.state_plane = system == 2;
     const auto zone = integer_at(record, 162);
-    if (!header.geographic) {
+    if (header.state_plane) {
+        header.zone = zone.value_or(0);
+    } else if (!header.geographic) {
         if (!zone || *zone == 0 || std::abs(*zone) > 60)
             return unusable_grid(
                 path, fmt::format("its UTM zone is '{}', but zones are 1 to 60", record.substr(162, kIntegerBytes)));
@@ -192,7 +147,7 @@ Result<void> read_system(const std::string& path, std::string_view record, Heade
     if (!known)
         return unusable_grid(path, fmt::format("its ground unit is '{}', but {}", record.substr(528, kIntegerBytes),
                                                header.geographic ? "degrees come from 0 (radians) or 3 (arc-seconds)"
-                                                                 : "UTM coordinates are in 1 (feet) or 2 (metres)"));
+                                                                 : "planar coordinates are in 1 (feet) or 2 (metres)"));
     header.ground = static_cast<Unit>(*ground);
     const auto height = integer_at(record, 534);
     if (height != 1 && height != 2)
@@ -275,6 +230,22 @@ std::optional<std::size_t> find_first_profile(const ByteFile& file, std::string_
     return std::nullopt;
 }
 
+/// 0: none, or in a unit that leaves it open.
+int epsg_of_state_plane(const Header& header) {
+    if (header.datum == Datum::nad27 && header.ground == Unit::feet) return epsg_of_state_plane_nad27(header.zone);
+    if (header.datum == Datum::nad83 && header.ground == Unit::metres) return epsg_of_state_plane_nad83(header.zone);
+    return 0;
+}
+
+Result<void> check_state_plane(const std::string& path, const Header& header) {
+    if (!header.state_plane || epsg_of_state_plane(header) != 0) return {};
+    return unusable_grid(path, fmt::format("it lies in state plane zone {} on datum {}, in {}; those on NAD27 (1) in "
+                                           "US survey feet and on NAD83 (4) in metres are read where their zone is "
+                                           "known",
+                                           header.zone, static_cast<int>(header.datum),
+                                           header.ground == Unit::feet ? "feet" : "metres"));
+}
+
 Result<Header> read_header(const ByteFile& file) {
     const Result<std::string> start = file.head(kRecordBytes);
     if (!start) return start.error();
@@ -291,6 +262,7 @@ Result<Header> read_header(const ByteFile& file) {
     const std::size_t line_end = start->find_first_of("\r\n", kFixedBytes);
     read_datums(std::string_view(*start).substr(0, std::min(*first, line_end)), header);
     header.first_profile = static_cast<std::int64_t>(*first);
+    if (auto known = check_state_plane(path, header); !known) return known.error();
     return header;
 }
 
@@ -503,23 +475,32 @@ int epsg_of_geographic(Datum datum) {
     return kCodes[static_cast<int>(datum) - 1];
 }
 
+int epsg_of(const Header& header) {
+    if (header.state_plane) return epsg_of_state_plane(header);
+    return header.geographic ? epsg_of_geographic(header.datum) : epsg_of_utm(header.datum, header.zone);
+}
+
 Georeference place_of(const Grid& grid) {
     const Header& header = grid.header;
+    // A state plane's CRS counts in the unit of the file.
+    const Unit unit = header.state_plane ? Unit::metres : header.ground;
     Georeference place;
-    place.column_x = step_in_units_of_crs(header.step_x, grid.columns, header.ground);
-    place.row_y = -step_in_units_of_crs(header.step_y, grid.rows, header.ground);
-    place.first_x = in_units_of_crs(grid.west, header.ground);
-    place.first_y = in_units_of_crs(grid.south + static_cast<double>(grid.rows - 1) * header.step_y, header.ground);
+    place.column_x = step_in_units_of_crs(header.step_x, grid.columns, unit);
+    place.row_y = -step_in_units_of_crs(header.step_y, grid.rows, unit);
+    place.first_x = in_units_of_crs(grid.west, unit);
+    place.first_y = in_units_of_crs(grid.south + static_cast<double>(grid.rows - 1) * header.step_y, unit);
     place.raster_is_point = true;
     place.geographic = header.geographic;
     place.vertical_datum = header.vertical_datum;
     place.height_unit_m = header.height == Unit::feet ? 0.3048 : 1;
-    const int epsg = header.geographic ? epsg_of_geographic(header.datum) : epsg_of_utm(header.datum, header.zone);
+    const int epsg = epsg_of(header);
     if (epsg == 0) return place;
     constexpr const char* kDatums[] = {"NAD27", "WGS 72", "WGS 84", "NAD83"};
     place.crs = fmt::format("EPSG:{}", epsg);
     place.crs_name = kDatums[static_cast<int>(header.datum) - 1];
-    if (!header.geographic)
+    if (header.state_plane)
+        place.crs_name += fmt::format(" / state plane zone {}", header.zone);
+    else if (!header.geographic)
         place.crs_name += fmt::format(" / UTM zone {}{}", std::abs(header.zone), header.zone > 0 ? 'N' : 'S');
     return place;
 }

@@ -1,10 +1,13 @@
 #include "tools/source/warp_map.h"
 
+#include <emmintrin.h>
+
 #include <algorithm>
 #include <array>
 #include <cassert>
 #include <cmath>
 #include <condition_variable>
+#include <limits>
 #include <mutex>
 #include <optional>
 #include <utility>
@@ -89,6 +92,18 @@ std::int64_t floor_to_chunk(std::int64_t i) {
     return i - (rest < 0 ? rest + WarpMap::kChunk : rest);
 }
 
+/// out[i] = start + slope * ((first + i) * step), two at a time.
+void fill_line(double start, double slope, double first, double step, std::int64_t count, double* out) {
+    const __m128d starts = _mm_set1_pd(start), slopes = _mm_set1_pd(slope), steps = _mm_set1_pd(step);
+    __m128d at = _mm_set_pd(first + 1, first);
+    std::int64_t i = 0;
+    for (; i + 2 <= count; i += 2) {
+        _mm_storeu_pd(out + i, _mm_add_pd(starts, _mm_mul_pd(slopes, _mm_mul_pd(at, steps))));
+        at = _mm_add_pd(at, _mm_set1_pd(2));
+    }
+    if (i < count) out[i] = start + slope * ((first + static_cast<double>(i)) * step);
+}
+
 /// A square of a chunk; it stands for the points [i, i + size) x [j, j + size) and has corners on all four sides.
 struct Cell {
     int i, j, size;
@@ -99,6 +114,8 @@ struct Request {
     int left, top, right, bottom;  ///< in the chunk; right and bottom excluded
     std::ptrdiff_t first, pitch;   ///< the chunk's point (0, 0) in `out`, asked for or not, and from row to row
     SourcePoints out;
+
+    WarpMap::Bounds* bounds = nullptr;  ///< where only these are wanted; then there is no `out`
 
     bool meets(const Cell& cell) const {
         return cell.i < right && cell.i + cell.size > left && cell.j < bottom && cell.j + cell.size > top;
@@ -139,6 +156,8 @@ private:
     enum class Fit { interpolate, divide, every_point };
     Fit judge(const Cell& cell) const;
     void fill(const Cell& cell, const Request& request) const;
+    void bound(const Cell& cell, const Request& request) const;
+    void bound_every_point(const Cell& cell, const Request& request) const;
     void want_every_point(const Cell& cell, const Request& request);
     void copy_every_point(const Cell& cell, const Request& request) const;
 
@@ -217,12 +236,29 @@ void Worker::fill(const Cell& cell, const Request& request) const {
         const double columns = right.column - left.column, rows = right.row - left.row;
         double* const column = &request.out.column[request.index(first, j)];
         double* const row = &request.out.row[request.index(first, j)];
-        for (int i = 0; i < last - first; ++i) {
-            const double s = (i + first - cell.i) * step;
-            column[i] = left.column + columns * s;
-            row[i] = left.row + rows * s;
-        }
+        fill_line(left.column, columns, first - cell.i, step, last - first, column);
+        fill_line(left.row, rows, first - cell.i, step, last - first, row);
     }
+}
+
+void include(WarpMap::Bounds& bounds, const Place& place) {
+    if (!is_somewhere(place)) return;
+    bounds.west = std::min(bounds.west, place.column);
+    bounds.east = std::max(bounds.east, place.column);
+    bounds.north = std::min(bounds.north, place.row);
+    bounds.south = std::max(bounds.south, place.row);
+}
+
+// What is bilinear is greatest and least at corners.
+void Worker::bound(const Cell& cell, const Request& request) const {
+    for (int corner = 0; corner < 4; ++corner)
+        include(*request.bounds, at(cell.i + (corner & 1) * cell.size, cell.j + (corner >> 1) * cell.size));
+}
+
+void Worker::bound_every_point(const Cell& cell, const Request& request) const {
+    for (int j = std::max(cell.j, request.top); j < std::min(cell.j + cell.size, request.bottom); ++j)
+        for (int i = std::max(cell.i, request.left); i < std::min(cell.i + cell.size, request.right); ++i)
+            include(*request.bounds, at(i, j));
 }
 
 void Worker::want_every_point(const Cell& cell, const Request& request) {
@@ -253,7 +289,7 @@ void Worker::map_chunk(const TargetGrid& grid, const SourceAffine& affine, std::
         next_cells_.clear();
         for (const Cell& cell : cells_) {
             const Fit fit = judge(cell);
-            if (fit == Fit::interpolate) fill(cell, request);
+            if (fit == Fit::interpolate) request.bounds != nullptr ? bound(cell, request) : fill(cell, request);
             if (fit == Fit::every_point) single_.push_back(cell);
             if (fit != Fit::divide) continue;
             for (int part = 0; part < 4; ++part) {
@@ -266,7 +302,8 @@ void Worker::map_chunk(const TargetGrid& grid, const SourceAffine& affine, std::
     }
     for (const Cell& cell : single_) want_every_point(cell, request);
     evaluate(grid, affine, i0, j0);
-    for (const Cell& cell : single_) copy_every_point(cell, request);
+    for (const Cell& cell : single_)
+        request.bounds != nullptr ? bound_every_point(cell, request) : copy_every_point(cell, request);
 }
 
 /// Workers that nobody is using.
@@ -341,6 +378,24 @@ struct WarpMap::Impl {
     Impl(const TargetGrid& target, const SourceAffine& source, Crs from, Crs to, const LonLatBox* area)
         : grid(target), affine(source), direct(compose(target, source)), pool(std::move(from), std::move(to), area) {}
 
+    void for_each_chunk(std::int64_t i0, std::int64_t j0, std::int64_t columns, std::int64_t rows, SourcePoints out,
+                        Bounds* bounds) {
+        const Borrowed worker(pool);
+        for (std::int64_t chunk_j = floor_to_chunk(j0); chunk_j < j0 + rows; chunk_j += kChunk) {
+            for (std::int64_t chunk_i = floor_to_chunk(i0); chunk_i < i0 + columns; chunk_i += kChunk) {
+                const Request request{static_cast<int>(std::max<std::int64_t>(i0 - chunk_i, 0)),
+                                      static_cast<int>(std::max<std::int64_t>(j0 - chunk_j, 0)),
+                                      static_cast<int>(std::min(i0 + columns - chunk_i, kChunk)),
+                                      static_cast<int>(std::min(j0 + rows - chunk_j, kChunk)),
+                                      (chunk_j - j0) * columns + (chunk_i - i0),
+                                      columns,
+                                      out,
+                                      bounds};
+                worker->map_chunk(grid, affine, chunk_i, chunk_j, request);
+            }
+        }
+    }
+
     TargetGrid grid;
     SourceAffine affine;
     GridAffine direct;
@@ -370,10 +425,10 @@ void map_affine(const GridAffine& affine, std::int64_t i0, std::int64_t j0, std:
         const double down = static_cast<double>(j);
         const double left_column = affine.origin.column + down * affine.by_j.column;
         const double left_row = affine.origin.row + down * affine.by_j.row;
-        for (std::int64_t i = i0; i < i0 + columns; ++i) {
-            *column++ = left_column + static_cast<double>(i) * affine.by_i.column;
-            *row++ = left_row + static_cast<double>(i) * affine.by_i.row;
-        }
+        fill_line(left_column, affine.by_i.column, static_cast<double>(i0), 1, columns, column);
+        fill_line(left_row, affine.by_i.row, static_cast<double>(i0), 1, columns, row);
+        column += columns;
+        row += columns;
     }
 }
 
@@ -384,19 +439,26 @@ void WarpMap::map(std::int64_t i0, std::int64_t j0, std::int64_t columns, std::i
     assert(out.column.size() == static_cast<std::size_t>(columns * rows) && out.row.size() == out.column.size());
     if (exact()) return map_affine(impl_->direct, i0, j0, columns, rows, out);
     if (columns <= 0 || rows <= 0) return;
-    const Borrowed worker(impl_->pool);
-    for (std::int64_t chunk_j = floor_to_chunk(j0); chunk_j < j0 + rows; chunk_j += kChunk) {
-        for (std::int64_t chunk_i = floor_to_chunk(i0); chunk_i < i0 + columns; chunk_i += kChunk) {
-            const Request request{static_cast<int>(std::max<std::int64_t>(i0 - chunk_i, 0)),
-                                  static_cast<int>(std::max<std::int64_t>(j0 - chunk_j, 0)),
-                                  static_cast<int>(std::min(i0 + columns - chunk_i, kChunk)),
-                                  static_cast<int>(std::min(j0 + rows - chunk_j, kChunk)),
-                                  (chunk_j - j0) * columns + (chunk_i - i0),
-                                  columns,
-                                  out};
-            worker->map_chunk(impl_->grid, impl_->affine, chunk_i, chunk_j, request);
-        }
+    impl_->for_each_chunk(i0, j0, columns, rows, out, nullptr);
+}
+
+std::optional<WarpMap::Bounds> WarpMap::bounds(std::int64_t i0, std::int64_t j0, std::int64_t columns,
+                                               std::int64_t rows) const {
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    Bounds bounds{kInfinity, -kInfinity, kInfinity, -kInfinity};
+    if (columns <= 0 || rows <= 0) return std::nullopt;
+    if (exact()) {
+        for (const std::int64_t i : {i0, i0 + columns - 1})
+            for (const std::int64_t j : {j0, j0 + rows - 1}) {
+                double column = 0, row = 0;
+                map_affine(impl_->direct, i, j, 1, 1, {{&column, 1}, {&row, 1}});
+                include(bounds, {column, row});
+            }
+    } else {
+        impl_->for_each_chunk(i0, j0, columns, rows, {}, &bounds);
     }
+    if (!(bounds.west <= bounds.east)) return std::nullopt;
+    return bounds;
 }
 
 WarpMap::Shrink WarpMap::shrink_at(std::int64_t i, std::int64_t j) const {

@@ -276,6 +276,21 @@ TEST_F(Sampling, PassesTheReadingOnToTheLetterAndMapsWhatIsWritten) {
               "--nodata=-32767\n--\na b.tif\n-odd.tif\n");
 }
 
+TEST_F(Sampling, AsksForHeightsAboveTheDatasetsDatumUnlessTheyAreTakenAsTheyAre) {
+    test::write_bytes(folder_.file("ready"), file_of({}, kHeights));
+    SamplingOptions options = program(
+        "printf '%s\\n' \"$@\" > \"$(dirname \"$0\")/words\"\n"
+        "cat \"$(dirname \"$0\")/ready\" >&${3#--fd=}");
+    options.vertical_crs = "EPSG:5773";
+    for (const bool as_they_are : {false, true}) {
+        options.assume_same_datum = as_they_are;
+        ASSERT_TRUE(sample_sources({"a.tif"}, options));
+        const auto bytes = test::read_bytes(folder_.file("words"));
+        const std::string words(bytes.begin(), bytes.end());
+        EXPECT_EQ(words.find("--vertical-crs=EPSG:5773\n") == std::string::npos, as_they_are) << words;
+    }
+}
+
 TEST_F(Sampling, FailsWithTheExitCodeOfTheProgram) {
     expect_failure("exit 3", ErrorCode::input, "exit code 3");
     expect_failure("exit 2", ErrorCode::usage, "exit code 2");

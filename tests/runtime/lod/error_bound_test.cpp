@@ -88,13 +88,15 @@ TEST(ErrorBound, WhereSlotsBindTheCutIsTheUnlimitedOneAtTheLeastToleranceThatFit
                 free.texture_tau_px = texture_tau;
                 return unlimited.select({&camera, 1}, free, residency);
             };
-            // One in 32, but no root's, is left for the proof that nothing finer fits.
-            const auto planned_with = [&](std::int64_t slots) {
+            // One in 32, but no root's, is left for the proof that nothing finer fits, unless all there is fits.
+            const auto planned_with = [&](std::int64_t slots, std::size_t tiles) {
+                if (slots >= static_cast<std::int64_t>(tiles)) return slots;
                 return std::max(slots - slots / 32, std::min(slots, roots));
             };
             const auto fits = [&](const Selection& free) {
-                return slots_taken(terrain, free) <= planned_with(settings.height_slots) &&
-                       texture_slots_taken(terrain, free) <= planned_with(settings.texture_slots);
+                return slots_taken(terrain, free) <= planned_with(settings.height_slots, terrain.tiles().size()) &&
+                       texture_slots_taken(terrain, free) <=
+                           planned_with(settings.texture_slots, terrain.textures().size());
             };
             ASSERT_TRUE(fits(s));
             ASSERT_EQ(s.budget_limited, !fits(at(settings.tau_px, settings.texture_tau_px)));
@@ -175,6 +177,32 @@ TEST(ErrorBound, ASplitThatCannotBeMadeCostsNoSlots) {
             ASSERT_TRUE(test::same_selection(plenty, selector.select({&camera, 1}, settings, residency)));
         }
     }
+}
+
+TEST(ErrorBound, AStoreWhoseEveryTileHasASlotIsNeverLimited) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    int whole = 0;
+    for (int world = 0; world < 30; ++world) {
+        const auto terrain = test::random_terrain(random, 0, 1, test::depth_of_world(world));
+        test::FakeResidency residency(terrain);
+        residency.add_all();
+        Selector selector(terrain.dataset());
+        SelectionSettings settings = test::with_tau(0);
+        settings.height_slots = static_cast<std::int64_t>(terrain.tiles().size());
+        settings.texture_slots = std::max<std::int64_t>(static_cast<std::int64_t>(terrain.textures().size()),
+                                                        terrain.lattice().root_rows * terrain.lattice().root_columns);
+        for (const Camera& camera : test::views_all_round(test::random_camera(random, terrain).eye)) {
+            const Selection s = selector.select({&camera, 1}, settings, residency);
+            ASSERT_FALSE(s.budget_limited);
+            ASSERT_EQ(s.tau_effective_px, 0);
+        }
+        const auto all_round = test::views_all_round(test::random_camera(random, terrain).eye);
+        const Selection s = selector.select(all_round, settings, residency);
+        ASSERT_FALSE(s.budget_limited);
+        whole += slots_taken(terrain, s) > settings.height_slots - settings.height_slots / 32 ? 1 : 0;
+    }
+    EXPECT_GT(whole, 5) << "no view takes what used to be reserved";
 }
 
 TEST(ErrorBound, MoreSlotsNeverDrawFewerTiles) {

@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <numeric>
 
 #include "tests/common/test_support.h"
 #include "tests/tools/source/test_tiff.h"
@@ -264,6 +264,9 @@ TEST_F(ImageStacks, GiveTheSameWhateverIsAskedForWhen) {
                 add_layer(scene, top, 2);
                 ASSERT_NO_FATAL_FAILURE(finish(scene, kernel));
                 ASSERT_EQ(scene.layers.size(), 2u);
+                // None, a few blocks, enough.
+                constexpr std::array<std::int64_t, 3> kMemory{0, 30 * SpooledPixels::kBlockBytes, 1 << 27};
+                scene.options.spool_memory_bytes = kMemory[static_cast<std::size_t>(test::uniform(random_, 0, 2))];
                 ASSERT_NO_FATAL_FAILURE(check(scene, kWhole, warped ? "turned" : "aligned"));
             }
         }
@@ -313,6 +316,7 @@ TEST_F(ImageStacks, NorthUpFilesTakeNoDiskAndOthersGiveItBack) {
         const std::int64_t file = std::int64_t{5} * 16 * 64 * 64 * 4;
         EXPECT_EQ(planned, turned ? file : 0);
         EXPECT_EQ(image_stack_bytes(scene.files), file);
+        scene.options.spool_memory_bytes = 20 * SpooledPixels::kBlockBytes;
         const auto stack = scene.open();
         std::int64_t most = 0;
         for (std::int64_t j = 0; j < 2000; j += 64) {

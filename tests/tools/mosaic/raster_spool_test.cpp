@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include <cmath>
 #include <limits>
 
@@ -64,6 +66,8 @@ TYPED_TEST(Spooled, HoldsWhatRectanglesLaidOverOneAnotherHold) {
             const std::int64_t columns = test::uniform(random, 1, 150), rows = test::uniform(random, 1, 150);
             std::vector<T> window(static_cast<std::size_t>(columns * rows));
             ASSERT_TRUE((*spool)->read(c0, r0, columns, rows, window).ok());
+            const bool empty = std::all_of(window.begin(), window.end(), [&](T v) { return same(v, nothing); });
+            ASSERT_TRUE(empty || (*spool)->holds_any(c0, r0, columns, rows));
             for (std::int64_t r = 0; r < rows; ++r)
                 for (std::int64_t c = 0; c < columns; ++c) {
                     const std::int64_t x = c0 + c, y = r0 + r;
@@ -96,6 +100,8 @@ TEST(RasterSpool, WhatIsNotWrittenTakesNoRoom) {
     const std::vector<double> values{1, 2, 3, 4};
     ASSERT_TRUE((*spool)->lay((std::int64_t{1} << 30) - 2, (std::int64_t{1} << 30) - 2, 2, 2, values).ok());
     EXPECT_EQ((*spool)->file_bytes(), 64 * 64 * 8);
+    EXPECT_FALSE((*spool)->holds_any((std::int64_t{1} << 30) - 200, (std::int64_t{1} << 30) - 64, 136, 300));
+    EXPECT_TRUE((*spool)->holds_any((std::int64_t{1} << 30) - 200, (std::int64_t{1} << 30) - 64, 137, 300));
     std::vector<double> read(4);
     ASSERT_TRUE((*spool)->read((std::int64_t{1} << 30) - 2, (std::int64_t{1} << 30) - 2, 2, 2, read).ok());
     EXPECT_EQ(read, values);

@@ -111,6 +111,35 @@ TEST(RawGrid, TheUpperLeftCentreAndTheStepsPlaceIt) {
     EXPECT_EQ(source->georeference()->row_y, -20);
 }
 
+TEST(RawGrid, StepsMayBeNamedAfterTheAxes) {
+    const TempDirectory directory;
+    const std::string path = directory.write("a.bil", raw_bytes<std::int16_t>({}));
+    for (const char* steps : {"dx 2\ndy 3\n", "xdim 2\nydim 3\ndx 9\ndy 9\n", "cellsize 2\nydim 3\n"}) {
+        directory.write("a.hdr", fmt::format("nrows {}\nncols {}\nnbits 16\n", kRows, kColumns) + steps +
+                                     "xllcorner 10\nyllcorner 20\n");
+        const auto source = test::open_grid_or_fail(path);
+        ASSERT_TRUE(source && source->georeference()) << steps;
+        EXPECT_EQ(source->georeference()->first_x, 11) << steps;
+        EXPECT_EQ(source->georeference()->first_y, 20 + 3 * (kRows - 0.5)) << steps;
+        EXPECT_EQ(source->georeference()->row_y, -3) << steps;
+    }
+}
+
+// The point that the header names stays where it is.
+TEST(RawGrid, EnviRastersTurnAboutTheirTiePoint) {
+    const TempDirectory directory;
+    directory.write("a.hdr",
+                    "ENVI\nsamples = 29\nlines = 23\nbands = 1\ndata type = 2\nmap info = {UTM, 3.5, 5.5, 1000, 5000, "
+                    "10, 10, 33, North, WGS-84, units=Meters, rotation=90}\n");
+    const auto source = test::open_grid_or_fail(directory.write("a.img", raw_bytes<std::int16_t>({})));
+    ASSERT_TRUE(source && source->georeference());
+    const Georeference& g = *source->georeference();
+    EXPECT_NEAR(g.x(2, 4), 1000, 1e-9);
+    EXPECT_NEAR(g.y(2, 4), 5000, 1e-9);
+    EXPECT_NEAR(g.y(3, 4), 5010, 1e-9);  // columns run to the north
+    EXPECT_NEAR(g.x(2, 5), 1010, 1e-9);
+}
+
 TEST(RawGrid, WithoutAPlaceAWorldFileGivesIt) {
     const TempDirectory directory;
     directory.write("a.hdr", fmt::format("nrows {}\nncols {}\nnbits 16\npixeltype signedint\n", kRows, kColumns));
@@ -262,8 +291,12 @@ TEST(RawGrid, HeadersThatCannotBeAreRefused) {
     refused("ENVI\nsamples = 29\nlines = 23\n", "lacks data type");
     refused("ENVI\nsamples = 29\nlines = 23\ndata type = 2\nfile compression = 1\n", "compression");
     refused("ENVI\nsamples = 29\nlines = 23\ndata type = 2\nmap info = {UTM, 1, 1}\n", "six numbers");
-    refused("ENVI\nsamples = 29\nlines = 23\ndata type = 2\nmap info = {UTM, 1, 1, 0, 0, 1, 1, rotation=12}\n",
-            "rotated");
+    refused("ENVI\nsamples = 29\nlines = 23\ndata type = 2\nmap info = {UTM, 1, 1, 0, 0, 1, 2, rotation=12}\n",
+            "not square");
+    refused("ENVI\nsamples = 29\nlines = 23\ndata type = 2\nmap info = {UTM, 1, 1, 0, 0, 1, 1, rotation=x}\n",
+            "no angle");
+    refused("ENVI\nsamples = 29\nlines = 23\ndata type = 2\nmap info = {UTM, 1, 1, 0, 0, 1, 1, rotation=1e99}\n",
+            "no angle");
     refused("ENVI\nsamples = 29\nlines = 23\ndata type = 2\nmap info = {UTM, 1, 1, 0, 0, 0, 1}\n", "one line");
     directory.write("b.hdr", sides);
     test::expect_refusal(directory.path("b.hdr"), "name the raster");

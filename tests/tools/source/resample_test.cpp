@@ -308,6 +308,109 @@ TEST(Resample, OpaqueColoursAreTheBilinearMeanToWithinRounding) {
     }
 }
 
+TEST(Resample, OpaqueColoursAreTheCubicMeanToWithinRounding) {
+    SCREE_TRACE_SEED();
+    Random random(test::seed());
+    const Colours raster(12, 12, [&](double, double) { return static_cast<std::uint32_t>(random()) | 0xff000000U; });
+    for (int n = 0; n < 500; ++n) {
+        const double u = real(random, 0, 11), v = real(random, 0, 11);
+        const std::uint32_t got = sample(raster, raster.rule(Kernel::cubic), u, v);
+        for (int k = 0; k < 3; ++k) {
+            const Heights one(12, 12, [&](double x, double y) {
+                return channel(raster.values[static_cast<std::size_t>(y * 12 + x)], k);
+            });
+            const double expected = std::clamp(sample(one, one.rule(Kernel::cubic), u, v), 0.0, 255.0);
+            ASSERT_NEAR(channel(got, k), expected, 0.57);
+        }
+        ASSERT_EQ(channel(got, 3), 255);
+    }
+}
+
+TEST(Resample, OpaqueColoursThatShrinkAreTheMeanOfTheirAreaToWithinRounding) {
+    SCREE_TRACE_SEED();
+    Random random(test::seed());
+    const Colours raster(90, 90, [&](double, double) { return static_cast<std::uint32_t>(random()) | 0xff000000U; });
+    for (const double across : {1.2, 3.0, 17.5, 31.9, 40.0}) {
+        for (const double down : {1.0, 2.7, 31.9}) {
+            for (int n = 0; n < 20; ++n) {
+                const double u = real(random, 20, 69), v = std::floor(real(random, 20, 69));
+                std::array<double, 3> sum{};
+                const double high = down > 1 ? down : 1;  // on a row, where nothing is between rows
+                for (std::int64_t r = 0; r < 90; ++r) {
+                    for (std::int64_t c = 0; c < 90; ++c) {
+                        const auto x = static_cast<double>(c), y = static_cast<double>(r);
+                        const double wide = std::min(x + 0.5, u + across / 2) - std::max(x - 0.5, u - across / 2);
+                        const double tall = std::min(y + 0.5, v + high / 2) - std::max(y - 0.5, v - high / 2);
+                        if (wide <= 0 || tall <= 0) continue;
+                        for (int k = 0; k < 3; ++k)
+                            sum[static_cast<std::size_t>(k)] +=
+                                wide * tall * channel(raster.values[static_cast<std::size_t>(r * 90 + c)], k);
+                    }
+                }
+                const std::uint32_t got = sample(raster, raster.rule(Kernel::bilinear, across, down), u, v);
+                for (int k = 0; k < 3; ++k)
+                    ASSERT_NEAR(channel(got, k), sum[static_cast<std::size_t>(k)] / (across * high), 0.6)
+                        << across << " x " << down;
+            }
+        }
+    }
+}
+
+// One by one, many at a time, and as lines that cross: on windows of a raster, around its rims and beyond them.
+TEST(Resample, PointsGetTheSameColourAloneTogetherAndInLines) {
+    SCREE_TRACE_SEED();
+    Random random(test::seed());
+    for (int round = 0; round < 600; ++round) {
+        const int wide = test::uniform(random, 1, 40), high = test::uniform(random, 1, 40);
+        const int holes = test::uniform(random, 0, 2) == 0 ? test::uniform(random, 1, 20) : 0;
+        const Colours raster(wide, high, [&](double, double) {
+            const auto colour = static_cast<std::uint32_t>(random());
+            if (test::uniform(random, 1, 100) > holes) return colour | 0xff000000U;
+            return test::uniform(random, 0, 1) == 0 ? colour & 0x00ffffffU : colour;
+        });
+        const std::array<Kernel, 3> kernels{Kernel::nearest, Kernel::bilinear, Kernel::cubic};
+        const auto shrink = [&] { return test::uniform(random, 0, 1) == 0 ? 1.0 : real(random, 0.5, 40); };
+        const ResampleRule rule = raster.rule(kernels[static_cast<std::size_t>(test::uniform(random, 0, 2))], shrink(),
+                                              shrink(), test::uniform(random, 0, 1) == 0);
+        // From anywhere to anywhere, on samples now and then, in no order.
+        std::vector<double> columns(static_cast<std::size_t>(test::uniform(random, 1, 19))),
+            rows(static_cast<std::size_t>(test::uniform(random, 1, 9)));
+        const double beyond = test::uniform(random, 0, 1) == 0 ? 0 : 1.5;
+        const auto place = [&](std::vector<double>& line, int size) {
+            for (double& at : line) {
+                at = real(random, -beyond, size - 1 + beyond);
+                const int kind = test::uniform(random, 0, 9);
+                if (kind == 0) at = std::nearbyint(at);
+                if (kind == 1) at = std::nearbyint(at * 4096) / 4096;
+                if (kind == 2 && beyond > 0) at = kVoid;
+            }
+        };
+        place(columns, wide);
+        place(rows, high);
+        std::vector<double> u, v;
+        for (const double row : rows) {
+            for (const double column : columns) {
+                u.push_back(column);
+                v.push_back(row);
+            }
+        }
+        std::vector<std::uint32_t> alone, together(u.size()), lines(u.size());
+        for (std::size_t k = 0; k < u.size(); ++k) alone.push_back(sample(raster, rule, u[k], v[k]));
+        resample_colours(raster.window(), {u, v}, rule, together);
+        resample_colour_lines(raster.window(), {columns, rows}, rule, lines);
+        ASSERT_EQ(together, alone);
+        ASSERT_EQ(lines, alone);
+        for (const double at : columns) {
+            const std::int64_t nearest = nearest_sample(at, wide, rule.half_sample_rim);
+            const double rim = (rule.half_sample_rim ? 0.5 : 0) + 1e-6;
+            if (at >= -rim && at <= wide - 1 + rim)
+                ASSERT_LE(std::abs(static_cast<double>(nearest) - std::clamp(at, 0.0, wide - 1.0)), 0.5);
+            else
+                ASSERT_EQ(nearest, -1);
+        }
+    }
+}
+
 TEST(Resample, TransparentPixelsGiveNoColour) {
     Colours raster(2, 2, [](double, double) { return rgba(200, 100, 50); });
     raster.at(1, 0) = raster.at(1, 1) = rgba(0, 255, 0, 0);

@@ -1,11 +1,14 @@
 #include <algorithm>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "tests/tools/source/grid_test_support.h"
+#include "tools/source/crs.h"
+#include "tools/source/state_plane.h"
 
 namespace scree {
 namespace {
@@ -256,6 +259,58 @@ TEST(UsgsDem, DatumAndZoneNameTheCrs) {
     }
 }
 
+TEST(UsgsDem, StatePlaneZonesAreReadWhereNumberDatumAndUnitSayWhichCrsTheyAre) {
+    const TempDirectory directory;
+    const struct {
+        int zone, unit;
+        const char *datums, *crs;
+        double metres_per_unit;
+    } read[] = {{401, 1, "   1", "EPSG:26741", 1200.0 / 3937},  // California I
+                {401, 2, "   4", "EPSG:26941", 1},
+                {503, 1, "    ", "EPSG:26755", 1200.0 / 3937},  // Colorado South
+                {4601, 2, "   4", "EPSG:32148", 1},             // Washington North
+                {5001, 1, "   1", "EPSG:26731", 1200.0 / 3937}};
+    for (const auto& c : read) {
+        Dem dem = small();
+        dem.system = 2;
+        dem.zone = c.zone;
+        dem.ground_unit = c.unit;
+        dem.datums = c.datums;
+        const Georeference place = place_of(directory, dem);
+        EXPECT_EQ(place.crs, c.crs);
+        EXPECT_EQ(place.column_x, 30);
+        EXPECT_EQ(place.first_x, 560010);
+        const auto crs = Crs::parse(place.crs);
+        ASSERT_TRUE(crs);
+        EXPECT_DOUBLE_EQ(crs->metres_per_unit(), c.metres_per_unit);
+    }
+    // Metres on NAD27, feet on NAD83 (which differ by state), a number of no zone, another datum.
+    for (const auto& [zone, unit, datums] :
+         {std::tuple{401, 2, "   1"}, {401, 1, "   4"}, {390, 2, "   4"}, {401, 2, "   3"}, {-401, 1, "   1"}}) {
+        Dem dem = small();
+        dem.system = 2;
+        dem.zone = zone;
+        dem.ground_unit = unit;
+        dem.datums = datums;
+        test::expect_refusal(directory.write("a.dem", file_of(dem)), fmt::format("state plane zone {}", zone));
+    }
+}
+
+TEST(UsgsDem, EveryStatePlaneZoneThatIsKnownIsOneOfItsDatumAndUnit) {
+    int known = 0;
+    for (int zone = -1; zone < 10000; ++zone)
+        for (const bool nad27 : {true, false}) {
+            const int epsg = nad27 ? epsg_of_state_plane_nad27(zone) : epsg_of_state_plane_nad83(zone);
+            if (epsg == 0) continue;
+            ++known;
+            const auto crs = Crs::parse(fmt::format("EPSG:{}", epsg));
+            ASSERT_TRUE(crs) << zone;
+            EXPECT_EQ(crs->name().substr(0, 5), nad27 ? "NAD27" : "NAD83") << zone << ": " << crs->name();
+            EXPECT_DOUBLE_EQ(crs->metres_per_unit(), nad27 ? 1200.0 / 3937 : 1) << zone << ": " << crs->name();
+        }
+    EXPECT_GT(known, 230);
+}
+
 TEST(UsgsDem, FilesThatEndTheirHeaderBeforeItsDatumAreOfNad27) {
     const TempDirectory directory;
     const Dem dem = rectangle(5, 9);
@@ -285,7 +340,7 @@ TEST(UsgsDem, SystemsAndUnitsThatAreNotKnownAreRefused) {
         change(dem);
         test::expect_refusal(directory.write("a.dem", file_of(dem)), words);
     };
-    refuse([](Dem& d) { d.system = 2; }, "state plane");
+    refuse([](Dem& d) { d.system = 2; }, "state plane zone 10 on datum 1, in metres");
     refuse([](Dem& d) { d.system = 7; }, "ground reference system");
     refuse([](Dem& d) { d.pattern = 2; }, "scattered");
     refuse([](Dem& d) { d.zone = 0; }, "zone");

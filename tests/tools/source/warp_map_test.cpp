@@ -72,6 +72,36 @@ struct Mapped {
     std::size_t index(std::int64_t i, std::int64_t j) const { return static_cast<std::size_t>(j * columns + i); }
 };
 
+/// What is mapped lies within the bounds, and the bounds within what is mapped around it: up to the chunks' far
+/// corners.
+void check_bounds(const WarpMap& map, std::int64_t i0, std::int64_t j0, std::int64_t wide, std::int64_t high) {
+    const auto least = [](const std::vector<double>& values) {
+        double found = std::numeric_limits<double>::infinity();
+        for (const double v : values) found = v < found ? v : found;
+        return found;
+    };
+    const auto greatest = [&](std::vector<double> values) {
+        for (double& v : values) v = -v;
+        return -least(values);
+    };
+    const auto bounds = map.bounds(i0, j0, wide, high);
+    const Mapped inner(map, i0, j0, wide, high);
+    if (!bounds) {
+        ASSERT_TRUE(std::isinf(least(inner.column)));
+        return;
+    }
+    const auto close = [](double at) { return 1e-9 * std::max(1.0, std::abs(at)); };
+    ASSERT_LE(bounds->west, least(inner.column) + close(bounds->west));
+    ASSERT_GE(bounds->east, greatest(inner.column) - close(bounds->east));
+    ASSERT_LE(bounds->north, least(inner.row) + close(bounds->north));
+    ASSERT_GE(bounds->south, greatest(inner.row) - close(bounds->south));
+    const Mapped outer(map, i0 - 64, j0 - 64, wide + 129, high + 129);
+    ASSERT_GE(bounds->west, least(outer.column) - kWarpBoundSamples);
+    ASSERT_LE(bounds->east, greatest(outer.column) + kWarpBoundSamples);
+    ASSERT_GE(bounds->north, least(outer.row) - kWarpBoundSamples);
+    ASSERT_LE(bounds->south, greatest(outer.row) + kWarpBoundSamples);
+}
+
 bool same(double a, double b) { return a == b || (std::isnan(a) && std::isnan(b)); }
 
 WarpMap make(const TargetGrid& grid, const std::string& grid_crs, const Georeference& source,
@@ -165,6 +195,7 @@ TEST(WarpMap, PointsAreWithinTheBoundOfProjsOwn) {
 
         const std::int64_t i0 = test::uniform(random, -200, 100), j0 = test::uniform(random, -200, 100);
         const Mapped got(map, i0, j0, 100, 90);
+        ASSERT_NO_FATAL_FAILURE(check_bounds(map, i0, j0, 100, 90));
         for (std::int64_t j = 0; j < 90; ++j) {
             for (std::int64_t i = 0; i < 100; ++i) {
                 const std::size_t k = got.index(i, j);
@@ -342,6 +373,7 @@ TEST(WarpMap, WithoutATransformPlacesAreExact) {
         const WarpMap map = make(grid, "EPSG:32633", place, "EPSG:32633");
         ASSERT_TRUE(map.exact());
         const Mapped got(map, -3, 1000000, 5, 3);
+        ASSERT_NO_FATAL_FAILURE(check_bounds(map, -3, 1000000, 5, 3));
         for (std::int64_t j = 0; j < 3; ++j) {
             for (std::int64_t i = 0; i < 5; ++i) {
                 const std::size_t k = got.index(i, j);
@@ -406,6 +438,7 @@ TEST(WarpMap, BeyondTheDomainIsNowhere) {
     place.row_y = -1e5;
     const WarpMap map = make(grid, "EPSG:3857", place, "EPSG:32633", {400, 400, nullptr});
     const Mapped got(map, 0, 0, 64, 64);
+    for (const std::int64_t i : {0, 20, 40, 64, 128}) ASSERT_NO_FATAL_FAILURE(check_bounds(map, i, 3, 20, 30));
     std::size_t nowhere = 0;
     for (std::int64_t j = 0; j < 64; ++j) {
         for (std::int64_t i = 0; i < 64; ++i) {

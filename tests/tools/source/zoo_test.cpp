@@ -284,8 +284,8 @@ TEST(ZooAgainstGdal, GdalsOwnTestFiles) {
         // complex numbers
         "cfloat32.tif", "cfloat64.tif", "cint16.tif", "cint32.tif", "cint_sar.tif", "complex_float32.tif",
         "complex_int32.tif",
-        // a world file with commas beside it; 24-bit floats; 12-bit JPEG; LogLuv; run-length BMP
-        "byte_nogeoref.tif", "float24.tif", "mandrilmini_12bitjpeg.tif", "uint16_sgilog.tif", "byte_rle8.bmp",
+        // 24-bit floats; 12-bit JPEG; LogLuv; run-length BMP
+        "float24.tif", "mandrilmini_12bitjpeg.tif", "uint16_sgilog.tif", "byte_rle8.bmp",
         // tiles without a size, which only GDAL's own convention knows; PackBits that ends early
         "cog_sparse_strile_arrays_zeroified_when_possible.tif", "cog_strile_arrays_zeroified_when_possible.tif",
         "contig_tiled.tif", "separate_tiled.tif",

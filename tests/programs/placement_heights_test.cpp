@@ -1,5 +1,5 @@
-// Proof of placement: planes and colour ramps of known slope, written through every path, come back from the store
-// where they were, within a hundredth of a source sample. A plane that grows along a raster's columns and one along
+// Proof of placement of heights: planes of known slope, written through every path, come back from the store where they
+// were, within a hundredth of a source sample. A plane that grows along a raster's columns and one along
 // its rows tell the place of every stored sample from its height.
 #include <gtest/gtest.h>
 
@@ -10,19 +10,14 @@
 #include <optional>
 
 #include "common/query/ground.h"
-#include "common/store/height_codec.h"
-#include "common/store/sqlite_store.h"
-#include "common/store/texture_codec.h"
 #include "tests/common/test_support.h"
-#include "tests/programs/placement_inputs.h"
+#include "tests/programs/placement_support.h"
 #include "tests/programs/reports.h"
-#include "tools/source/crs.h"
 
 namespace scree::test {
 namespace {
 
-constexpr double kSharedLimit = 1e-6;  // samples: of points so near a raster's limit either is right
-constexpr double kBoundSamples = 0.01;
+constexpr double kSharedLimit = 1e-6;      // samples: of points so near a raster's limit either is right
 constexpr double kRoundingSamples = 1e-3;  // of quanta, float32 and curvature within a sample
 
 // A plane over a CRS: `along_columns` of heights per sample along the columns of `grid`, and so for rows.
@@ -34,27 +29,6 @@ struct Plane {
         const auto [column, row] = grid.sample_of(x, y);
         return offset + along_columns * column + along_rows * row;
     }
-};
-
-// Points of one CRS in another.
-class Move {
-public:
-    Move(const std::string& from, const std::string& to) : transform_(make(from, to)) {}
-    void operator()(std::vector<double>& x, std::vector<double>& y) const { transform_.apply(x, y); }
-    std::pair<double, double> one(double x, double y) const {
-        std::vector<double> xs{x}, ys{y};
-        transform_.apply(xs, ys);
-        return {xs[0], ys[0]};
-    }
-
-private:
-    static CrsTransform make(const std::string& from, const std::string& to) {
-        const auto a = Crs::parse(from), b = Crs::parse(to);
-        auto made = CrsTransform::make(*a, *b);
-        EXPECT_TRUE(made) << from << " to " << to;
-        return std::move(*made);
-    }
-    CrsTransform transform_;
 };
 
 // A raster that may be cut into several files; of those that overlap the later one lies on top.
@@ -114,52 +88,6 @@ struct Expected {
     enum Kind : std::uint8_t { nothing, height, either };
     std::vector<Kind> kind;
     std::vector<double> z, tolerance;
-};
-
-class StoreUnderTest {
-public:
-    explicit StoreUnderTest(const std::string& path) : store_(open(path)), dataset_(store_->dataset()) {}
-
-    const Dataset& dataset() const { return dataset_; }
-    const Lattice& lattice() const { return dataset_.lattice; }
-    const SqliteStore& store() const { return *store_; }
-    std::int64_t pitch() const { return lattice().cells_x + 1; }
-    std::size_t index(std::int64_t i, std::int64_t j) const { return static_cast<std::size_t>(j * pitch() + i); }
-
-    std::vector<std::pair<TileId, HeightTile>> height_tiles() const {
-        std::vector<std::pair<TileId, HeightTile>> tiles;
-        const auto ok = store_->for_each(TileKind::height, [&](const SqliteStore::RowView& row) {
-            const auto id = tile_from_key(lattice(), row.key);
-            auto tile = decode_height_tile(row.payload, lattice().tile_cells_log2, row.codec);
-            EXPECT_TRUE(id && tile);
-            if (id && tile) tiles.emplace_back(*id, std::move(*tile));
-            return true;
-        });
-        EXPECT_TRUE(ok);
-        return tiles;
-    }
-
-    /// Where the lattice's points are in a CRS.
-    void points_in(const std::string& crs, std::vector<double>& x, std::vector<double>& y) const {
-        const auto count = static_cast<std::size_t>(pitch() * (lattice().cells_y + 1));
-        x.resize(count);
-        y.resize(count);
-        for (std::int64_t j = 0; j <= lattice().cells_y; ++j)
-            for (std::int64_t i = 0; i <= lattice().cells_x; ++i) {
-                x[index(i, j)] = lattice().x_m(static_cast<double>(i));
-                y[index(i, j)] = lattice().y_m(static_cast<double>(j));
-            }
-        Move(dataset_.crs, crs)(x, y);
-    }
-
-private:
-    static std::unique_ptr<SqliteStore> open(const std::string& path) {
-        auto opened = SqliteStore::open(path);
-        if (!opened) throw std::runtime_error(opened.error().message);
-        return std::move(*opened);
-    }
-    std::unique_ptr<SqliteStore> store_;
-    Dataset dataset_;
 };
 
 // Greatest difference of the plane over one sample of a raster.
@@ -284,16 +212,6 @@ void expect_cells(const StoreUnderTest& store, const Expected& expected) {
     EXPECT_TRUE(found.empty()) << "beyond the extent";
 }
 
-// Metres of the store between samples, the lesser of both ways.
-double ground_step(const SampleGrid& g, const std::string& crs) {
-    const Move move(g.crs, crs);
-    const auto at = [&](int c, int r) { return move.one(g.x(c, r), g.y(c, r)); };
-    const auto [x, y] = at(g.width / 2, g.height / 2);
-    const auto [ex, ey] = at(g.width / 2 + 1, g.height / 2);
-    const auto [sx, sy] = at(g.width / 2, g.height / 2 + 1);
-    return std::min(std::hypot(ex - x, ey - y), std::hypot(sx - x, sy - y));
-}
-
 // Within a sample outside of a raster of areas that lies above: there it goes on with its border's value, and the
 // surface has a step.
 bool at_a_rim_above(const Sources& sources, const Patch& patch, double x, double y) {
@@ -378,29 +296,9 @@ Sources one(const SampleGrid& grid, HeightFormat format = HeightFormat::striped,
             std::vector<std::string> arguments = {}) {
     return {{{grid, {}, format}}, std::move(arguments)};
 }
-SampleGrid of_areas(SampleGrid grid) {
-    grid.area = true;
-    return grid;
-}
-SampleGrid south_up(const SampleGrid& g) {
-    SampleGrid s = g;
-    s.first_y = g.y(0, g.height - 1);
-    s.row_y = -g.row_y;
-    return s;
-}
-
 const SampleGrid kUtm = north_up("EPSG:32633", 452345.5, 5298765.25, 30, 75, 67);
 const SampleGrid kDegrees = north_up("EPSG:4326", 13.7, 47.4, 1.0 / 1200, 61, 67);
 SampleGrid mercator() { return north_up("EPSG:3857", 1500000, 8399737, 40, 61, 67); }  // at 60 degrees north
-
-// Files of one patch: 2 x 2, whose inner borders share a sample or adjoin.
-std::vector<std::array<int, 4>> quarters(const SampleGrid& g, int shared) {
-    const int c = g.width / 2, r = g.height / 2;
-    return {{0, 0, c + shared, r + shared},
-            {c, 0, g.width - c, r + shared},
-            {0, r, c + shared, g.height - r},
-            {c, r, g.width - c, g.height - r}};
-}
 
 TEST(Placement, OfEveryGeoTiffThatNeedsNoResampling) {
     for (const HeightFormat format : {HeightFormat::striped, HeightFormat::tiled, HeightFormat::matrix})
@@ -560,209 +458,6 @@ TEST(Placement, OfFineInsetsInACoarseBase) {
     sources.patches.push_back({inset, quarters(inset, 1), HeightFormat::striped});
     sources.plane_of = 1;
     expect_in_place(sources);
-}
-
-// Imagery. Levels rise and fall along a wave that is oblique to the raster; blue is red's complement, so
-// that whatever rounding or compression prefer, they prefer it in both directions.
-constexpr double kOblique = 0.31;
-
-struct Wave {
-    SampleGrid grid;
-    double along_columns = 1, along_rows = kOblique;
-    double rise = 3;  ///< levels a pixel
-
-    // 0..255 and back.
-    double phase(double x, double y) const {
-        const auto [c, r] = grid.sample_of(x, y);
-        return rise * (along_columns * c + along_rows * r) + 17000;
-    }
-    static double level(double phase) {
-        const double at = std::fmod(phase, 510);
-        return at <= 255 ? at : 510 - at;
-    }
-    double slope(double phase) const { return std::fmod(phase, 510) <= 255 ? rise : -rise; }
-    /// Pixels to the next crest or trough.
-    double to_turn(double phase) const {
-        const double at = std::fmod(phase, 255);
-        return std::min(at, 255 - at) / rise;
-    }
-};
-
-struct Texel {
-    double red = 0, blue = 0;
-    bool opaque = false;
-};
-
-// BC1: two colours of 5, 6 and 5 bits and two between them, or one and none.
-Texel bc1_texel(const std::uint8_t* block, int x, int y) {
-    const int a = block[0] | block[1] << 8, b = block[2] | block[3] << 8, pick = block[4 + y] >> (2 * x) & 3;
-    const auto five = [](int v) { return static_cast<double>((v & 31) << 3 | (v & 31) >> 2); };
-    if (a <= b && pick == 3) return {};
-    const double share = pick == 0 ? 0 : pick == 1 ? 1 : a > b ? (pick == 2 ? 1.0 / 3 : 2.0 / 3) : 0.5;
-    const auto between = [&](int shift) { return five(a >> shift) * (1 - share) + five(b >> shift) * share; };
-    return {between(11), between(0), true};
-}
-
-struct ImageCheck {
-    double worst = 0;             ///< levels
-    double sum = 0, squares = 0;  ///< of residual times slope, and of the slope
-    double red = 0, blue = 0;     ///< sums of residuals
-    std::int64_t texels = 0, bare = 0;
-};
-
-// Over the texels of the deepest level whose neighbourhood is within the image and away from the wave's turns.
-ImageCheck compare_texels(const StoreUnderTest& store, const Wave& wave) {
-    const Dataset& d = store.dataset();
-    const int level = d.texture_deepest_level, size = d.texture_size();
-    const double texel_m = d.texel_m(level);
-    const Move move(d.crs, wave.grid.crs);
-    ImageCheck check;
-    const auto look = [&](const SqliteStore::RowView& row) {
-        const auto id = tile_from_key(store.lattice(), row.key);
-        if (!id || id->level != level) return true;
-        const auto tile = decode_texture_tile(row.payload, d.texture_size_log2, row.codec);
-        EXPECT_TRUE(tile);
-        const std::uint8_t* blocks = tile->blocks.data() + bc1_mip_offset(d.texture_size_log2, 0);
-        std::vector<double> x, y;
-        for (int r = 0; r < size; ++r)
-            for (int c = 0; c < size; ++c) {
-                x.push_back(d.lattice.origin_x_m + (static_cast<double>(id->x * size + c) + 0.5) * texel_m);
-                y.push_back(d.lattice.origin_y_m - (static_cast<double>(id->y * size + r) + 0.5) * texel_m);
-            }
-        const std::vector<double> store_x = x, store_y = y;
-        move(x, y);
-        const double east = d.lattice.x_m(static_cast<double>(d.lattice.cells_x)),
-                     south = d.lattice.y_m(static_cast<double>(d.lattice.cells_y));
-        const double texel_px = texel_m / ground_step(wave.grid, d.crs), clear = 1.5 + texel_px;
-        for (int r = 0; r < size; ++r)
-            for (int c = 0; c < size; ++c) {
-                const auto k = static_cast<std::size_t>(r * size + c);
-                if (store_x[k] > east || store_y[k] < south) continue;
-                const auto [u, v] = wave.grid.sample_of(x[k], y[k]);
-                if (!(std::min({u, v, wave.grid.width - 1 - u, wave.grid.height - 1 - v}) > clear)) continue;
-                const double phase = wave.phase(x[k], y[k]);
-                if (wave.to_turn(phase) < 2 * clear) continue;
-                const Texel t = bc1_texel(blocks + 8 * (r / 4 * (size / 4) + c / 4), c % 4, r % 4);
-                ++check.texels;
-                check.bare += !t.opaque;
-                const double off = (t.red + 255 - t.blue) / 2 - Wave::level(phase);
-                check.worst = std::max(check.worst, std::abs(off));
-                check.sum += off * wave.slope(phase);
-                check.squares += wave.rise * wave.rise;
-                check.red += t.red - Wave::level(phase);
-                check.blue += t.blue - 255 + Wave::level(phase);
-            }
-        return true;
-    };
-    EXPECT_TRUE(store.store().for_each(TileKind::texture, look));
-    return check;
-}
-
-struct ImageSetup {
-    SampleGrid image;
-    SampleGrid heights = north_up("EPSG:32633", 452345, 5298765, 30, 97, 97);
-    bool matrix = false, png = false;
-    std::vector<std::array<int, 4>> parts = {};
-    std::vector<std::string> arguments = {};
-    double rise = 3;
-    int half_pixels = 0;  ///< of the nearest kernel
-};
-
-void expect_wave_in_place(const ImageSetup& in, const Wave& wave) {
-    const TemporaryFolder folder;
-    std::filesystem::create_directories(folder.file("in"));
-    std::vector<std::string> arguments{write_placed_heights(folder.file("in"), "heights", HeightFormat::striped,
-                                                            in.heights, [](int, int) { return 7; })};
-    arguments.push_back("--imagery");
-    auto parts = in.parts;
-    if (parts.empty()) parts.push_back({0, 0, in.image.width, in.image.height});
-    for (const auto& [c, r, columns, rows] : parts) {
-        const SampleGrid part = in.image.part(c, r, columns, rows);
-        const auto level = [&](int i, int j) { return Wave::level(wave.phase(part.x(i, j), part.y(i, j))); };
-        const std::string name = "image" + std::to_string(arguments.size());
-        arguments.push_back(in.png ? write_placed_png(folder.file("in"), name, part, level)
-                                   : write_placed_image(folder.file("in"), name, part, in.matrix, level));
-    }
-    arguments.insert(arguments.end(), in.arguments.begin(), in.arguments.end());
-    build_store_from(arguments, folder.file("s.scree"));
-    const StoreUnderTest store(folder.file("s.scree"));
-    const ImageCheck check = compare_texels(store, wave);
-    const double moved_px = check.sum / check.squares;
-    EXPECT_GT(check.texels, 20000);
-    EXPECT_EQ(check.bare, 0);
-    EXPECT_LT(std::abs(moved_px), kBoundSamples);
-    // Half a level in the mean; a texel within a step of BC1's five bits besides what both roundings to bytes may take.
-    const auto texels = static_cast<double>(check.texels);
-    EXPECT_LT(std::abs(check.red) / texels, 0.5);
-    EXPECT_LT(std::abs(check.blue) / texels, 0.5);
-    EXPECT_LT(check.worst, 1 + 255.0 / 31 + in.half_pixels * wave.rise * (1 + kOblique) / 2) << "levels";
-    if (std::getenv("SCREE_PLACEMENT_TELL") != nullptr)
-        std::printf("    %lld texels, moved by %.5f pixels, worst %.3f levels, red %.3f blue %.3f\n",
-                    static_cast<long long>(check.texels), moved_px, check.worst, check.red / texels,
-                    check.blue / texels);
-}
-
-void expect_image_in_place(const ImageSetup& in) {
-    {
-        SCOPED_TRACE("along columns");
-        expect_wave_in_place(in, {in.image, 1, kOblique, in.rise});
-    }
-    {
-        SCOPED_TRACE("along rows");
-        expect_wave_in_place(in, {in.image, kOblique, 1, in.rise});
-    }
-}
-
-const SampleGrid kImage = of_areas(north_up("EPSG:32633", 452300, 5298810, 9.3, 330, 330));
-
-TEST(PlacementOfImagery, OfAreasAndPoints) {
-    expect_image_in_place(ImageSetup{kImage});
-    SampleGrid points = kImage;
-    points.area = false;
-    expect_image_in_place(ImageSetup{points});
-    ImageSetup png{kImage};
-    png.png = true;
-    png.arguments = {"--assume-crs", "EPSG:32633"};
-    expect_image_in_place(png);
-}
-
-TEST(PlacementOfImagery, OfTurnedAndSouthUpImages) {
-    for (SampleGrid image : {kImage.turned(30), south_up(kImage)}) {
-        image.first_x += 400;
-        ImageSetup in{image};
-        in.matrix = true;
-        expect_image_in_place(in);
-    }
-}
-
-TEST(PlacementOfImagery, OfOtherCrs) {
-    expect_image_in_place(ImageSetup{of_areas(north_up("EPSG:4326", 14.366, 47.843, 1.0 / 9000, 340, 240))});
-    expect_image_in_place(ImageSetup{of_areas(north_up("EPSG:3857", 1599300, 6080800, 13.7, 330, 330))});
-    expect_image_in_place(ImageSetup{of_areas(north_up("EPSG:32632", 900100, 5313500, 9, 400, 400))});
-}
-
-TEST(PlacementOfImagery, OfEveryKernelAndAnyScale) {
-    for (const char* kernel : {"bilinear", "cubic", "nearest"})
-        for (const double pixel : {4.1, 7.4, 29.0}) {
-            if (std::string(kernel) == "cubic" && pixel < 20) continue;  // means, as bilinear gives
-            SCOPED_TRACE(std::string(kernel) + ", " + std::to_string(pixel));
-            ImageSetup in{of_areas(north_up("EPSG:32633", 452300, 5298810, pixel, 300, 300)).turned(-3)};
-            in.matrix = true;
-            in.arguments = {"--resampling", kernel};
-            in.half_pixels = std::string(kernel) == "nearest";
-            if (pixel > 20) in.rise = 7;
-            expect_image_in_place(in);
-        }
-}
-
-TEST(PlacementOfImagery, OfMosaicsAtTheirJoints) {
-    ImageSetup in{kImage};
-    in.parts = quarters(kImage, 0);
-    expect_image_in_place(in);
-    std::reverse(in.parts.begin(), in.parts.end());
-    in.image = kImage.turned(-10);
-    in.matrix = true;
-    expect_image_in_place(in);
 }
 
 }  // namespace
