@@ -15,8 +15,8 @@ inline constexpr int kLeafErrorTiles = 16;
 inline constexpr int kMaxLeafErrorLog2 = 6;
 
 /// `samples` and `present`: (2^n + 1)^2 vertices, row-major, of kLeafErrorTiles tiles each; present 0 or -1, or nullptr
-/// where every vertex of every tile is. Writes the error of geomip level g of tile t, in 2^-(g + 1) quanta and without
-/// regard to other levels, to worst[g * kLeafErrorTiles + t].
+/// where every vertex of every tile is. Writes the error of geomip level g of tile t, in 2^-(g + 1) quanta, to
+/// worst[g * kLeafErrorTiles + t]; where it is below the errors before it, it need not be exact.
 using LeafErrorKernel = void(const int32_t* samples, const int32_t* present, int tile_cells_log2, int32_t* worst);
 
 /// A plane over a tile's vertices in units of 1 / scale quanta, and the part of the tile where it is looked at: all of

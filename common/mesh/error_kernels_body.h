@@ -73,9 +73,10 @@ inline void look_at_block(const Tiles& tiles, int log2_stride, int bi, int bj, i
     const Ints nw = doubled(centre - s * south - s * east), ne = doubled(centre - s * south + s * east);
     const Ints sw = doubled(centre + s * south - s * east), se = doubled(centre + s * south + s * east);
     if (s > 1) {  // else it is the finest surface
-        // The outermost vertices of the north and west sides are those of the block beyond, where there is one.
-        const Side north{centre, -south, east, first_row ? s : s - 1, true};
-        const Side west{centre, -east, south, first_column ? s : s - 1, false};
+        // The outermost vertices of the north and west sides are those of the block beyond. On the tile's border there
+        // is none, but the edges there are those of the level before, thinned.
+        const Side north{centre, -south, east, s - 1, true};
+        const Side west{centre, -east, south, s - 1, false};
         look_at_side<kMasked>(tiles, north, c, doubled(centre - s * south), nw, ne, c_2s, times_2s, extremes);
         look_at_side<kMasked>(tiles, west, c, doubled(centre - s * east), nw, sw, c_2s, times_2s, extremes);
         look_at_side<kMasked>(tiles, {centre, south, east, s, true}, c, doubled(centre + s * south), sw, se, c_2s,
