@@ -79,6 +79,16 @@ private:
     std::string problem_;
 };
 
+std::optional<std::array<double, 4>> box_of(const Json& json) {
+    std::array<double, 4> box{};
+    if (!json.is_array() || json.size() != box.size()) return std::nullopt;
+    for (std::size_t k = 0; k < box.size(); ++k) {
+        if (!json[k].is_number() || !std::isfinite(json[k].get<double>())) return std::nullopt;
+        box[k] = json[k].get<double>();
+    }
+    return box;
+}
+
 bool is_fingerprint(const std::string& text) {
     return text.size() == 16 && text.find_first_not_of("0123456789abcdef") == std::string::npos;
 }
@@ -126,6 +136,8 @@ std::string dataset_to_json(const Dataset& d) {
         sources.push_back(
             {{"name", s.name}, {"role", s.role}, {"bytes", s.bytes}, {"width", s.width}, {"height", s.height}});
         if (!s.fingerprint.empty()) sources.back()["fingerprint"] = s.fingerprint;
+        if (s.box_m) sources.back()["box_m"] = *s.box_m;
+        if (!s.layer.empty()) sources.back()["layer"] = s.layer;
     }
     Json json = {{"format_version", kFormatVersion},
                  {"origin_x_m", d.lattice.origin_x_m},
@@ -155,6 +167,7 @@ std::string dataset_to_json(const Dataset& d) {
                  {"sources", sources},
                  {"attribution", d.attribution}};
     if (d.coarsest_leaf_level) json["coarsest_leaf_level"] = *d.coarsest_leaf_level;
+    if (!d.options.empty()) json["options"] = d.options;
     return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
@@ -205,10 +218,22 @@ Result<Dataset> dataset_from_json(const std::string& text) {
             source.read("width", record.width);
             source.read("height", record.height);
             if (item.contains("fingerprint")) source.read("fingerprint", record.fingerprint);
+            if (item.contains("layer")) source.read("layer", record.layer);
+            if (item.contains("box_m")) {
+                record.box_m = box_of(item.at("box_m"));
+                if (!record.box_m) return store_error("dataset: source 'box_m' is not four finite numbers");
+            }
             if (!source.problem().empty()) return store_error("dataset: source " + source.problem());
             if (item.contains("fingerprint") && !is_fingerprint(record.fingerprint))
                 return store_error("dataset: source 'fingerprint' is not 16 hexadecimal digits");
             d.sources.push_back(std::move(record));
+        }
+    }
+    if (const auto options = json.find("options"); options != json.end()) {
+        if (!options->is_object()) return store_error("dataset: 'options' is not an object");
+        for (const auto& [name, value] : options->items()) {
+            if (!value.is_string()) return store_error("dataset: an option is not text");
+            d.options[name] = value.get<std::string>();
         }
     }
     if (!fields.problem().empty()) return store_error("dataset: " + fields.problem());

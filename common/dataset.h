@@ -2,7 +2,9 @@
 // checked.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -22,6 +24,10 @@ struct SourceRecord {
     std::int64_t height = 0;
     /// 16 hexadecimal digits (docs/store-format.md, "Dataset"); empty in stores that were made without.
     std::string fingerprint{};
+    /// West, south, east, north of its samples in the dataset's CRS, and what tells the grid that its samples are counted
+    /// in from another one. For updates; stores that were made without have neither.
+    std::optional<std::array<double, 4>> box_m{};
+    std::string layer{};
 };
 
 struct Dataset {
@@ -48,8 +54,10 @@ struct Dataset {
     std::int64_t texture_tiles = 0;
     std::int64_t present_cells = 0;  ///< cells of leaves, each of its own size, whose four samples were valid
 
-    std::vector<SourceRecord> sources;
+    std::vector<SourceRecord> sources;  ///< bottom to top where they overlap
     std::string attribution;
+    /// The options that it was built with, by their names on the command line: an update goes on with them.
+    std::map<std::string, std::string> options;
 
     int texture_size() const { return 1 << texture_size_log2; }
     /// Metres along the side of a texel of texture level `level`.

@@ -36,7 +36,16 @@ double coarse_block_error(const BlockVertices& block, std::int64_t stride, std::
 
 /// Errors of a deepest-level tile against itself at geomip levels 0..n-1 with all thinned variants, in quanta,
 /// saturated (never falling with the level).
-std::array<double, kMaxTileCellsLog2> leaf_errors(const FinestVertices& finest);
+using LeafErrors = std::array<double, kMaxTileCellsLog2>;
+LeafErrors leaf_errors(const FinestVertices& finest);
+/// The same of several tiles of one size, `errors` an entry each: sixteen at a time in the lanes of a vector.
+void leaf_errors(std::span<const FinestVertices> tiles, std::span<LeafErrors> errors);
+
+/// max(known, coarse_block_error(block, ...)), given the tile's own errors: what a few of its vertices miss the block
+/// by, and how far the others can be from a surface through those, mostly shows that no vertex passes `known`. The
+/// tile's corner lies at multiples of its cells from the block's centre.
+double greatest_block_error(const BlockVertices& block, std::int64_t stride, std::int64_t offset_i,
+                            std::int64_t offset_j, const FinestVertices& finest, const LeafErrors& own, double known);
 
 /// The smallest float not below `value` >= 0.
 float round_up_to_float(double value);

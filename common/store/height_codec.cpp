@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <zstd.h>
 
+#include <array>
 #include <bit>
 #include <cassert>
 #include <cmath>
@@ -43,12 +44,34 @@ bool read_bounds(ByteReader& in, HeightBounds& bounds, int levels) {
     return good;
 }
 
-// Residual of the plane predictor west + north - northwest; the first row and column predict from what there is.
-template <class At>
-std::int32_t predict(const At& at, int i, int j) {
-    if (i == 0) return j == 0 ? 0 : at(0, j - 1);
-    if (j == 0) return at(i - 1, 0);
-    return at(i - 1, j) + at(i, j - 1) - at(i - 1, j - 1);
+// Residuals of the plane predictor west + north - northwest, zigzag coded; the first row and column predict from what
+// there is. Loops that vectors can take. Returns the bits that any of them has.
+std::uint32_t predict(std::span<const std::int32_t> samples, std::size_t pitch, std::span<std::uint32_t> residuals) {
+    std::uint32_t all = 0;
+    const std::int32_t* z = samples.data();
+    std::uint32_t* out = residuals.data();
+    for (std::size_t j = 0; j < pitch; ++j, z += pitch, out += pitch) {
+        out[0] = zigzag(j == 0 ? z[0] : z[0] - *(z - pitch));
+        if (j == 0) {
+            for (std::size_t i = 1; i < pitch; ++i) out[i] = zigzag(z[i] - z[i - 1]);
+        } else {
+            const std::int32_t* above = z - pitch;
+            for (std::size_t i = 1; i < pitch; ++i) out[i] = zigzag(z[i] - z[i - 1] - (above[i] - above[i - 1]));
+        }
+        for (std::size_t i = 0; i < pitch; ++i) all |= out[i];
+    }
+    return all;
+}
+
+// Bytes of the values, the lowest of all first.
+void split(std::span<const std::uint32_t> values, std::size_t planes, std::span<std::uint8_t> bytes) {
+    const std::size_t count = values.size();
+    const std::uint32_t* from = values.data();
+    for (std::size_t plane = 0; plane < planes; ++plane) {
+        std::uint8_t* to = bytes.data() + plane * count;
+        const auto shift = static_cast<unsigned>(8 * plane);
+        for (std::size_t k = 0; k < count; ++k) to[k] = static_cast<std::uint8_t>(from[k] >> shift);
+    }
 }
 
 struct ZstdContexts {
@@ -63,7 +86,7 @@ ZstdContexts& zstd_contexts() {
 void append_presence(std::vector<std::uint8_t>& out, const std::vector<std::uint8_t>& presence) {
     std::uint8_t byte = 0;
     for (std::size_t k = 0; k < presence.size(); ++k) {
-        if (presence[k] != 0) byte = static_cast<std::uint8_t>(byte | (1u << (k % 8)));
+        byte = static_cast<std::uint8_t>(byte | (presence[k] != 0) << (k % 8));
         if (k % 8 == 7 || k + 1 == presence.size()) {
             out.push_back(byte);
             byte = 0;
@@ -83,25 +106,30 @@ Result<void> read_presence(ByteReader& in, std::size_t cells, std::vector<std::u
 // the row above. Sums wrap, and cannot wrap back into range unseen: in raster order the first height out of range is
 // less than 2^31 + 2^25 away. False: there is one.
 bool undo_prediction(std::span<const std::uint8_t> plain, int planes, int pitch, std::span<std::int32_t> samples) {
+    constexpr std::uint32_t kRange = 2u * kMaxHeightUnits;
     const std::size_t count = samples.size(), row = static_cast<std::size_t>(pitch);
-    thread_local std::vector<std::uint32_t> values;
-    values.resize(count);
-    for (std::size_t k = 0; k < count; ++k) values[k] = plain[k];
-    for (std::size_t p = 1; p < static_cast<std::size_t>(planes); ++p)
-        for (std::size_t k = 0; k < count; ++k) values[k] |= std::uint32_t{plain[p * count + k]} << (8 * p);
-    for (std::size_t k = 0; k < count; ++k) values[k] = static_cast<std::uint32_t>(unzigzag(values[k]));
+    const std::uint8_t* from = plain.data();
+    std::int32_t* to = samples.data();
+    std::uint32_t outside = 0;  // has a bit above kRange's where a height is out of range
+    std::array<std::uint32_t, (1 << kMaxTileCellsLog2) + 1> values, above{};
     for (std::size_t start = 0; start < count; start += row) {
+        for (std::size_t k = 0; k < row; ++k) values[k] = from[start + k];
+        for (std::size_t p = 1; p < static_cast<std::size_t>(planes); ++p) {
+            const std::uint8_t* bytes = from + p * count + start;
+            const auto shift = static_cast<unsigned>(8 * p);
+            for (std::size_t k = 0; k < row; ++k) values[k] |= std::uint32_t{bytes[k]} << shift;
+        }
+        for (std::size_t k = 0; k < row; ++k) values[k] = static_cast<std::uint32_t>(unzigzag(values[k]));
         std::uint32_t sum = 0;
-        for (std::size_t k = start; k < start + row; ++k) values[k] = sum += values[k];
-        if (start == 0) continue;
-        for (std::size_t k = start; k < start + row; ++k) values[k] += values[k - row];
+        for (std::size_t k = 0; k < row; ++k) values[k] = sum += values[k];
+        for (std::size_t k = 0; k < row; ++k) {
+            above[k] += values[k];
+            const std::uint32_t height = above[k] + kMaxHeightUnits;
+            outside |= height | (kRange - height);
+            to[start + k] = static_cast<std::int32_t>(above[k]);
+        }
     }
-    bool good = true;
-    for (std::size_t k = 0; k < count; ++k) {
-        samples[k] = static_cast<std::int32_t>(values[k]);
-        good &= values[k] + kMaxHeightUnits <= 2u * kMaxHeightUnits;
-    }
-    return good;
+    return outside >> std::bit_width(kRange) == 0;
 }
 
 }  // namespace
@@ -111,7 +139,6 @@ std::vector<std::uint8_t> encode_height_tile(const HeightTile& tile, int n, Heig
     const auto count = static_cast<std::size_t>(pitch * pitch);
     assert(tile.samples.size() == count);
     assert(tile.presence.empty() || tile.presence.size() == static_cast<std::size_t>(1 << (2 * n)));
-    const auto at = [&](int i, int j) { return tile.samples[static_cast<std::size_t>(j * pitch + i)]; };
 
     std::vector<std::uint8_t> payload;
     ByteWriter out(payload);
@@ -131,25 +158,20 @@ std::vector<std::uint8_t> encode_height_tile(const HeightTile& tile, int n, Heig
         return payload;
     }
 
-    std::vector<std::uint32_t> residuals(count);
-    std::uint32_t all = 0;
-    for (int j = 0; j < pitch; ++j)
-        for (int i = 0; i < pitch; ++i) {
-            const std::uint32_t r = zigzag(at(i, j) - predict(at, i, j));
-            residuals[static_cast<std::size_t>(j * pitch + i)] = r;
-            all |= r;
-        }
+    thread_local std::vector<std::uint32_t> residuals;
+    thread_local std::vector<std::uint8_t> plain, packed;
+    residuals.resize(count);
+    const std::uint32_t all = predict(tile.samples, static_cast<std::size_t>(pitch), residuals);
     const int planes = std::max(1, (static_cast<int>(std::bit_width(all)) + 7) / 8);
-    std::vector<std::uint8_t> plain;
-    plain.reserve(count * static_cast<std::size_t>(planes) + tile.presence.size() / 8 + 1);
-    for (int plane = 0; plane < planes; ++plane)
-        for (const std::uint32_t r : residuals) plain.push_back(static_cast<std::uint8_t>(r >> (8 * plane)));
+    plain.resize(count * static_cast<std::size_t>(planes));
+    split(residuals, static_cast<std::size_t>(planes), plain);
     append_presence(plain, tile.presence);
 
-    std::vector<std::uint8_t> packed(ZSTD_compressBound(plain.size()));
+    packed.resize(ZSTD_compressBound(plain.size()));
     const std::size_t size =
         ZSTD_compressCCtx(zstd_contexts().compress.get(), packed.data(), packed.size(), plain.data(), plain.size(), 1);
     assert(ZSTD_isError(size) == 0);
+    payload.reserve(payload.size() + 1 + size);
     out.u8(static_cast<std::uint8_t>(planes));
     out.bytes({packed.data(), size});
     return payload;
@@ -219,6 +241,11 @@ Result<void> decode_height_tile(std::span<const std::uint8_t> payload, int n, in
         }
     }
     return {};
+}
+
+std::optional<HeightMarks> height_marks(std::span<const std::uint8_t> payload) {
+    if (payload.size() < 2) return std::nullopt;
+    return HeightMarks{static_cast<std::uint8_t>(payload[0] & 15), (payload[1] & kHasPresence) != 0};
 }
 
 }  // namespace scree

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -24,5 +25,12 @@ Result<HeightTile> decode_height_tile(std::span<const std::uint8_t> payload, int
 /// The same into a tile whose buffers are reused; its content means nothing after an error.
 Result<void> decode_height_tile(std::span<const std::uint8_t> payload, int tile_cells_log2, int codec,
                                 HeightTile& tile);
+
+/// What stands in a payload's first bytes, without decoding it; nullopt for fewer bytes.
+struct HeightMarks {
+    std::uint8_t child_mask = 0;
+    bool some_absent = false;  ///< a leaf with absent cells
+};
+std::optional<HeightMarks> height_marks(std::span<const std::uint8_t> payload);
 
 }  // namespace scree

@@ -4,6 +4,8 @@
 #include <sqlite3.h>
 #include <xxhash.h>
 
+#include <algorithm>
+#include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <memory>
@@ -33,13 +35,14 @@ int file_read(sqlite3_file* f, void* buffer, int amount, sqlite3_int64 offset) {
 int file_write(sqlite3_file* f, const void* buffer, int amount, sqlite3_int64 offset) {
     if (!self(f)->is_database || !is_page(amount) || offset % amount != 0)
         return inner(f)->pMethods->xWrite(inner(f), buffer, amount, offset);
-    thread_local std::vector<std::uint8_t> page;
-    const auto* bytes = static_cast<const std::uint8_t*>(buffer);
-    page.assign(bytes, bytes + amount);
-    const std::uint64_t sum = page_checksum(page, static_cast<std::uint64_t>(offset / amount) + 1);
+    // Into SQLite's own copy of the page, in bytes that it does not use: so the journal of a later transaction holds a
+    // page that is right again when any SQLite brings it back.
+    auto* page = static_cast<std::uint8_t*>(const_cast<void*>(buffer));
+    const auto size = static_cast<std::size_t>(amount);
+    const std::uint64_t sum = page_checksum({page, size}, static_cast<std::uint64_t>(offset / amount) + 1);
     for (std::size_t k = 0; k < kPageChecksumBytes; ++k)
-        page[page.size() - kPageChecksumBytes + k] = static_cast<std::uint8_t>(sum >> (8 * k));
-    return inner(f)->pMethods->xWrite(inner(f), page.data(), amount, offset);
+        page[size - kPageChecksumBytes + k] = static_cast<std::uint8_t>(sum >> (8 * k));
+    return inner(f)->pMethods->xWrite(inner(f), buffer, amount, offset);
 }
 int file_truncate(sqlite3_file* f, sqlite3_int64 size) { return inner(f)->pMethods->xTruncate(inner(f), size); }
 int file_sync(sqlite3_file* f, int flags) { return inner(f)->pMethods->xSync(inner(f), flags); }
@@ -106,6 +109,41 @@ std::uint64_t page_checksum(std::span<const std::uint8_t> page, std::uint64_t nu
     return XXH3_64bits_withSeed(page.data(), page.size() - kPageChecksumBytes, number);
 }
 
+namespace {
+
+std::uint32_t big_endian_u32(const std::uint8_t* at) {
+    return std::uint32_t{at[0]} << 24 | std::uint32_t{at[1]} << 16 | std::uint32_t{at[2]} << 8 | at[3];
+}
+
+bool checksum_matches(const std::vector<std::uint8_t>& page, std::int64_t number) {
+    std::uint64_t stored = 0;
+    for (std::size_t k = 0; k < kPageChecksumBytes; ++k)
+        stored |= std::uint64_t{page[page.size() - kPageChecksumBytes + k]} << (8 * k);
+    return stored == page_checksum(page, static_cast<std::uint64_t>(number));
+}
+
+// Pages that hold nothing (SQLite file format, 1.5, "The Freelist"): the leaves of a list of trunk pages. SQLite
+// neither writes them when they become free nor saves them before it uses them again, so that anything may stand there.
+std::vector<bool> free_pages(std::FILE* file, const std::uint8_t* header, std::size_t page_size, std::int64_t pages) {
+    std::vector<bool> free(static_cast<std::size_t>(pages) + 1);
+    std::vector<std::uint8_t> trunk(page_size);
+    const std::size_t most_leaves = (page_size - kPageChecksumBytes) / 4 - 2;
+    std::int64_t number = big_endian_u32(header + 32);
+    for (std::int64_t steps = 0; number > 0 && number <= pages && steps < pages; ++steps) {
+        if (::fseeko(file, (number - 1) * static_cast<std::int64_t>(page_size), SEEK_SET) != 0) break;
+        if (std::fread(trunk.data(), 1, page_size, file) != page_size) break;
+        if (!checksum_matches(trunk, number)) break;  // what it lists is not to be believed
+        const std::size_t leaves = big_endian_u32(&trunk[4]);
+        for (std::size_t k = 0; k < std::min(leaves, most_leaves); ++k)
+            if (const std::int64_t leaf = big_endian_u32(&trunk[8 + 4 * k]); leaf <= pages)
+                free[static_cast<std::size_t>(leaf)] = true;
+        number = big_endian_u32(trunk.data());
+    }
+    return free;
+}
+
+}  // namespace
+
 Result<PageScan> scan_page_checksums(const std::string& path) {
     const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), std::fclose);
     if (!file) return Error{ErrorCode::io, fmt::format("{}: {}", path, std::strerror(errno))};
@@ -118,6 +156,9 @@ Result<PageScan> scan_page_checksums(const std::string& path) {
     if (!is_page(static_cast<int>(page_size)) || header[20] != kPageChecksumBytes)
         return Error{ErrorCode::store, fmt::format("{}: pages of {} bytes with {} reserved; a store reserves {}", path,
                                                    page_size, int{header[20]}, kPageChecksumBytes)};
+    if (::fseeko(file.get(), 0, SEEK_END) != 0) return Error{ErrorCode::io, fmt::format("{}: read error", path)};
+    const auto whole_pages = static_cast<std::int64_t>(::ftello(file.get())) / static_cast<std::int64_t>(page_size);
+    const std::vector<bool> free = free_pages(file.get(), header, page_size, whole_pages);
     std::rewind(file.get());
     PageScan scan;
     std::vector<std::uint8_t> page(page_size);
@@ -127,11 +168,9 @@ Result<PageScan> scan_page_checksums(const std::string& path) {
         if (got == 0) break;
         ++scan.pages;
         if (scan.pages == lock_page) continue;
-        std::uint64_t stored = 0;
-        for (std::size_t k = 0; k < kPageChecksumBytes; ++k)
-            stored |= std::uint64_t{page[page_size - kPageChecksumBytes + k]} << (8 * k);
-        if (got != page_size || stored != page_checksum(page, static_cast<std::uint64_t>(scan.pages)))
-            if (scan.damaged.size() < 100) scan.damaged.push_back(scan.pages);
+        if (got == page_size && (checksum_matches(page, scan.pages) || free[static_cast<std::size_t>(scan.pages)]))
+            continue;
+        if (scan.damaged.size() < 100) scan.damaged.push_back(scan.pages);
     }
     if (std::ferror(file.get()) != 0) return Error{ErrorCode::io, fmt::format("{}: read error", path)};
     return scan;

@@ -26,7 +26,8 @@ struct PageScan {
     std::vector<std::int64_t> damaged;  ///< page numbers, at most 100
 };
 
-/// Reads the file page by page. Errors: ErrorCode::io unreadable, ErrorCode::store when it is no database of this
+/// Reads the file page by page. Pages that hold nothing (SQLite's free list) are not checked: nobody has to write them.
+/// Errors: ErrorCode::io unreadable, ErrorCode::store when it is no database of this
 /// layout.
 Result<PageScan> scan_page_checksums(const std::string& path);
 

@@ -1,9 +1,10 @@
-// A store in one SQLite file (docs/store-format.md): tables dataset, height and texture of the same shape, a checksum a
-// row, a checksum a page.
+// A store in one SQLite file (docs/store-format.md): tables dataset, height, texture and seed of the same shape, a
+// checksum a row, a checksum a page.
 #pragma once
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -11,8 +12,10 @@
 
 namespace scree {
 
-/// Opens read-only. A store whose last update was cut off is brought back first, which needs the right to write it. Errors: ErrorCode::input missing or unreadable, ErrorCode::store not a store, damaged, or of
-/// another format version (both are named).
+/// Opens read-only. A store whose last update was cut off is brought back first, which needs the right to write it and
+/// its folder. Errors: ErrorCode::input missing or unreadable, ErrorCode::store not a store, damaged, or of another
+/// format version (both are named), ErrorCode::io.
+/// While another program commits an update, readers wait for it (a minute at most, then ErrorCode::io).
 class SqliteStore final : public TileStore {
 public:
     static Result<std::unique_ptr<SqliteStore>> open(const std::string& path);
@@ -32,42 +35,56 @@ public:
     Result<void> for_each(TileKind kind, const std::function<bool(const RowView&)>& visit) const;
 
     struct Contents {
-        std::int64_t height_rows = 0, texture_rows = 0;
-        std::int64_t height_bytes = 0, texture_bytes = 0;  ///< payloads
+        std::int64_t height_rows = 0, texture_rows = 0, seed_rows = 0;
+        std::int64_t height_bytes = 0, texture_bytes = 0, seed_bytes = 0;  ///< payloads
         std::int64_t file_bytes = 0;
     };
     Result<Contents> contents() const;
     /// SQLite's own structural check; empty text when sound.
     Result<std::string> integrity_problems() const;
-    /// SHA-256 over (table, key, codec, payload) of every row in key order, hexadecimal.
+    /// SHA-256 over (table, key, codec, payload) of every row in key order, hexadecimal: of the file as it is now.
     Result<std::string> digest() const;
     /// The file under the path is no longer what was opened: updated in place, or replaced. Cheap: one stat().
     bool has_changed() const;
 
 private:
-    SqliteStore(std::string path, Dataset dataset) : path_(std::move(path)), dataset_(std::move(dataset)) {}
+    struct FileIdentity {
+        std::uint64_t device = 0, inode = 0;
+        std::int64_t bytes = 0, modified_s = 0, modified_ns = 0;
+        bool operator==(const FileIdentity&) const = default;
+    };
+    static std::optional<FileIdentity> identity_of(const std::string& path);
+    SqliteStore(std::string path, Dataset dataset, std::optional<FileIdentity> file)
+        : path_(std::move(path)), dataset_(std::move(dataset)), file_(file) {}
     std::string path_;
     Dataset dataset_;
+    std::optional<FileIdentity> file_;
 };
 
-/// Writes a store. Single thread. A build goes on under a temporary name until finish() returned ok; the caller renames.
+/// Writes a store. Single thread. A build goes on under a temporary name until finish() returned ok; the caller
+/// renames.
 ///
-/// Crash safety: the file is at its last checkpoint() whatever happens at any write (SQLite's rollback journal, synced).
+/// Crash safety: the file is at its last checkpoint() whatever happens at any write (SQLite's rollback journal,
+/// synced).
 class SqliteStoreWriter {
 public:
     /// A new, empty file; an existing one is emptied.
     static Result<std::unique_ptr<SqliteStoreWriter>> create(const std::string& path);
-    /// A file that was cut off, brought back to its last checkpoint. Errors: ErrorCode::store where there is none to go
-    /// back to (empty file, not ours, damaged pages, another format version).
+    /// A file that was cut off, brought back to its last checkpoint; reads all of it once. Errors: ErrorCode::store
+    /// where there is none to go back to (no file or an empty one, not ours, damaged pages, another format version, and
+    /// a complete store, which SqliteStore::open takes).
     static Result<std::unique_ptr<SqliteStoreWriter>> resume(const std::string& path);
     /// A finished store, to be changed in one transaction that finish() commits; readers go on meanwhile and see all
-    /// of it or nothing. Errors: those of SqliteStore::open; ErrorCode::usage when another process is changing it.
+    /// of it or nothing. They wait during the commit, and from the first put beyond 256 MiB of changed pages on; a
+    /// reader that does not let go for 20 s makes it fail. Without finish() nothing changes, and there are no
+    /// checkpoints. Errors: those of SqliteStore::open; ErrorCode::usage when another writer is changing it.
     static Result<std::unique_ptr<SqliteStoreWriter>> amend(const std::string& path);
     ~SqliteStoreWriter();
     SqliteStoreWriter(const SqliteStoreWriter&) = delete;
     SqliteStoreWriter& operator=(const SqliteStoreWriter&) = delete;
 
-    /// Adds a row, or replaces the one of this key.
+    /// Adds a row, or replaces the one of this key. Any order will do; subtree by subtree, and within one by key, fills
+    /// pages best.
     Result<void> put(TileKind kind, std::int64_t key, int codec, std::span<const std::uint8_t> payload);
     Result<void> remove(TileKind kind, std::int64_t key);
     /// Reads a row, committed or not. False: there is none.

@@ -1,6 +1,7 @@
 // TileStore: where tiles are read from. The runtime and verify know this interface; SQLite stands behind it.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -14,6 +15,7 @@ namespace scree {
 
 /// Seeds are the textures' pixels at one level, for updates (docs/resume-and-update.md); the runtime reads none.
 enum class TileKind : int { height = 0, texture = 1, seed = 3 };
+inline constexpr std::array kTileKinds{TileKind::height, TileKind::texture, TileKind::seed};
 
 /// A row as stored.
 struct TileRow {

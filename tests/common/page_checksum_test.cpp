@@ -60,6 +60,66 @@ TEST(PageChecksums, EveryFlippedBitIsFound) {
     }
 }
 
+void remove_rows(const std::string& path) {
+    auto writer = SqliteStoreWriter::amend(path);
+    ASSERT_TRUE(writer.ok()) << writer.error().message;
+    for (std::int64_t key = 10; key < 40; ++key)
+        ASSERT_TRUE((*writer)->remove(key % 2 == 0 ? TileKind::height : TileKind::texture, key).ok());
+    ASSERT_TRUE((*writer)->finish((*SqliteStore::open(path))->dataset()).ok());
+}
+
+// SQLite need not write the leaves of its free list; its trunk, which says which they are, it must.
+TEST(PageChecksums, OnlyPagesThatHoldNothingGoUnchecked) {
+    const test::TemporaryFolder folder;
+    const std::string path = folder.file("store.scree");
+    write_small_store(path);
+    remove_rows(path);
+    const auto bytes = test::read_bytes(path);
+    EXPECT_EQ(scan_page_checksums(path)->damaged, std::vector<std::int64_t>{});
+    const std::int64_t free_pages = bytes[36] << 24 | bytes[37] << 16 | bytes[38] << 8 | bytes[39];
+    ASSERT_GT(free_pages, 3);
+    std::int64_t unchecked = 0;
+    for (std::int64_t page = 1; page <= static_cast<std::int64_t>(bytes.size()) / 16384; ++page) {
+        auto copy = bytes;
+        copy[static_cast<std::size_t>(page) * 16384 - 100] ^= 1;
+        test::write_bytes(path, copy);
+        const auto damaged = scan_page_checksums(path)->damaged;
+        unchecked += damaged.empty() ? 1 : 0;
+        if (!damaged.empty()) {
+            EXPECT_EQ(damaged, std::vector<std::int64_t>{page});
+        }
+    }
+    EXPECT_EQ(unchecked, free_pages - 1);
+}
+
+TEST(PageChecksums, AFreeListThatGoesInACircleOrOutOfTheFileEnds) {
+    const test::TemporaryFolder folder;
+    const std::string path = folder.file("store.scree");
+    write_small_store(path);
+    remove_rows(path);
+    const auto bytes = test::read_bytes(path);
+    const std::size_t trunk = std::size_t{bytes[34]} << 8 | bytes[35];
+    ASSERT_GT(trunk, 1u);
+    const auto with = [&](std::uint32_t next, std::uint32_t leaves, std::uint32_t leaf) {
+        auto copy = bytes;
+        std::uint8_t* page = &copy[(trunk - 1) * 16384];
+        const auto put = [&](std::size_t at, std::uint32_t value) {
+            for (std::size_t k = 0; k < 4; ++k) page[at + k] = static_cast<std::uint8_t>(value >> (24 - 8 * k));
+        };
+        put(0, next);
+        put(4, leaves);
+        put(8, leaf);
+        const std::uint64_t sum = page_checksum({page, 16384}, trunk);
+        for (std::size_t k = 0; k < 8; ++k) page[16376 + k] = static_cast<std::uint8_t>(sum >> (8 * k));
+        test::write_bytes(path, copy);
+        return scan_page_checksums(path);
+    };
+    const auto self = static_cast<std::uint32_t>(trunk);
+    for (const std::uint32_t next : {self, 0xFFFFFFFFu, 0u})
+        for (const std::uint32_t leaves : {0u, 4092u, 4093u, 0xFFFFFFFFu})
+            for (const std::uint32_t leaf : {0u, 1u, 0xFFFFFFFFu}) EXPECT_TRUE(with(next, leaves, leaf).ok());
+}
+
 TEST(PageChecksums, PagesThatChangedPlacesAreFound) {
     const test::TemporaryFolder folder;
     const std::string path = folder.file("store.scree");

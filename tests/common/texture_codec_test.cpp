@@ -1,6 +1,9 @@
 #include "common/store/texture_codec.h"
 
 #include <gtest/gtest.h>
+#include <zstd.h>
+
+#include <algorithm>
 
 #include "tests/common/test_support.h"
 
@@ -44,6 +47,76 @@ TEST(TextureCodec, RandomTilesComeBackExactly) {
             ASSERT_EQ(*back, tile);
         }
     }
+}
+
+TEST(TextureCodec, TilesOfTheGreatestSizeComeBackExactly) {
+    test::Random random(1);
+    for (const bool noisy : {false, true}) {
+        const TextureTile tile = random_tile(random, kMaxTextureSizeLog2, noisy);
+        const auto back = decode_texture_tile(encode_texture_tile(tile, kMaxTextureSizeLog2, TextureCodec::split),
+                                              kMaxTextureSizeLog2, static_cast<int>(TextureCodec::split));
+        ASSERT_TRUE(back.ok()) << back.error().message;
+        ASSERT_EQ(*back, tile);
+    }
+}
+
+/// What docs/store-format.md says a frame of codec 1 holds.
+std::vector<std::uint8_t> planes_and_selectors(const TextureTile& tile) {
+    std::vector<std::uint8_t> content;
+    for (std::size_t byte = 0; byte < 4; ++byte)
+        for (std::size_t at = byte; at < tile.blocks.size(); at += 8) content.push_back(tile.blocks[at]);
+    for (std::size_t at = 4; at < tile.blocks.size(); at += 8)
+        content.insert(content.end(), &tile.blocks[at], &tile.blocks[at] + 4);
+    return content;
+}
+
+TEST(TextureCodec, TheSplitFrameHoldsPlanesAndSelectorsAsDocumented) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    for (const int log2 : {kMinTextureSizeLog2, 4, 8})
+        for (const bool noisy : {false, true}) {
+            const TextureTile tile = random_tile(random, log2, noisy);
+            const auto payload = encode_texture_tile(tile, log2, TextureCodec::split);
+            std::vector<std::uint8_t> content(tile.blocks.size());
+            ASSERT_EQ(ZSTD_decompress(content.data(), content.size(), payload.data() + 1, payload.size() - 1),
+                      content.size());
+            EXPECT_EQ(content, planes_and_selectors(tile));
+        }
+}
+
+TEST(TextureCodec, AnyFrameOfTheDocumentedContentIsRead) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    for (const int level : {-5, 1, 19}) {
+        const TextureTile tile = random_tile(random, 8, level == 1);
+        const auto content = planes_and_selectors(tile);
+        std::vector<std::uint8_t> payload(1 + ZSTD_compressBound(content.size()));
+        payload[0] = tile.child_mask;
+        payload.resize(1 +
+                       ZSTD_compress(payload.data() + 1, payload.size() - 1, content.data(), content.size(), level));
+        const auto back = decode_texture_tile(payload, 8, static_cast<int>(TextureCodec::split));
+        ASSERT_TRUE(back.ok()) << back.error().message;
+        EXPECT_EQ(*back, tile);
+    }
+}
+
+/// Endpoints that rise slowly, as in photographs; selectors at random or all alike.
+TextureTile smooth_tile(test::Random& random, bool flat) {
+    TextureTile tile = random_tile(random, 8, true);
+    for (std::size_t at = 0; at < tile.blocks.size(); at += 8) {
+        tile.blocks[at + 1] = tile.blocks[at + 3] = static_cast<std::uint8_t>(at / 4096);
+        tile.blocks[at] = tile.blocks[at + 2] = static_cast<std::uint8_t>(test::uniform(random, 0, 15));
+        if (flat) std::fill_n(&tile.blocks[at + 4], 4, std::uint8_t{0xAA});
+    }
+    return tile;
+}
+
+TEST(TextureCodec, EndpointsArePackedAndFlatSelectorsToo) {
+    test::Random random(1);
+    const std::size_t size = bc1_chain_bytes(8);
+    EXPECT_LT(encode_texture_tile(smooth_tile(random, false), 8, TextureCodec::split).size(), size * 3 / 4);
+    EXPECT_LT(encode_texture_tile(smooth_tile(random, true), 8, TextureCodec::split).size(), size / 4);
+    EXPECT_LT(encode_texture_tile(random_tile(random, 8, true), 8, TextureCodec::split).size(), size + 64);
 }
 
 TEST(TextureCodec, ATileDecodedIntoAnUsedOneKeepsNothingOfIt) {

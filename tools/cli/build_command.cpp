@@ -10,6 +10,7 @@
 #include "common/report.h"
 #include "tools/cli/dataset_label.h"
 #include "tools/cli/height_options.h"
+#include "tools/pyramid/build_record.h"
 #include "tools/pyramid/builder.h"
 #include "tools/source/number_text.h"
 
@@ -19,14 +20,8 @@ namespace {
 const std::map<std::string, Kernel> kKernels = {
     {"nearest", Kernel::nearest}, {"bilinear", Kernel::bilinear}, {"cubic", Kernel::cubic}};
 
-Result<FillRule> parse_fill(const std::string& text) {
-    if (text == "smooth") return FillRule{FillRule::Kind::smooth};
-    if (text == "none") return FillRule{FillRule::Kind::none};
-    const auto height = parse_number(text);
-    if (!height || !(std::abs(*height) <= 1e7))
-        return Error{ErrorCode::usage, fmt::format("--fill {} is not smooth, none or a height within 1e7 m", text)};
-    return FillRule{FillRule::Kind::value, *height};
-}
+const std::map<std::string, TextureQuality> kTextureQualities = {{"normal", TextureQuality::normal},
+                                                                 {"high", TextureQuality::high}};
 
 void print_plan(const BuildPlan& plan) {
     const Dataset& d = plan.dataset;
@@ -84,6 +79,10 @@ int run_build(int argc, char** argv) {
         ->capture_default_str();
     app.add_option("--texture-size", options.texture_size, "Texels along a texture tile, a power of two")
         ->capture_default_str();
+    app.add_option("--texture-quality", options.texture_quality,
+                   "DXT1: normal, or high for 0.2 to 0.9 dB more at a fifteenth of the speed")
+        ->transform(CLI::CheckedTransformer(kTextureQualities, CLI::ignore_case))
+        ->default_str("normal");
     app.add_option("--height-quantum", options.height_quantum_m,
                    "Metres of the height unit; default: the source's own for integers, 1/64 m otherwise");
     app.add_option("--threads", options.threads, "0: one a core")->capture_default_str()->check(CLI::Range(0, 1024));
@@ -121,6 +120,8 @@ int run_build(int argc, char** argv) {
     if (!options.quiet)
         for (const std::string& line : report->notes) note("{}\n", line);
     if (!options.quiet)
+        if (report->reused_tiles > 0) note("{} tiles were there from before\n", report->reused_tiles);
+    if (!options.quiet)
         note("{}: {:.1f} MB, {} height tiles, {} texture tiles; {:.1f} s, {:.1f} CPU s, peak {} MiB\n", options.out,
              static_cast<double>(report->store_bytes) / 1e6, report->height_tiles, report->texture_tiles,
              report->seconds, report->cpu_seconds, report->peak_rss_bytes >> 20);
@@ -128,6 +129,7 @@ int run_build(int argc, char** argv) {
         note("resampling moved heights by {:.3f} m at most, {:.3f} m root mean square\n", report->warp_error_m,
              report->warp_rms_m);
     if (json.empty()) return 0;
+    const auto stage = [&](Stage s) { return report->stage_seconds[static_cast<std::size_t>(s)]; };
     const nlohmann::ordered_json out = {{"seconds", report->seconds},
                                         {"cpu_seconds", report->cpu_seconds},
                                         {"peak_rss_bytes", report->peak_rss_bytes},
@@ -138,7 +140,14 @@ int run_build(int argc, char** argv) {
                                         {"warp_rms_m", report->warp_rms_m},
                                         {"height_tiles", report->height_tiles},
                                         {"texture_tiles", report->texture_tiles},
-                                        {"store_bytes", report->store_bytes}};
+                                        {"store_bytes", report->store_bytes},
+                                        {"reused_tiles", report->reused_tiles},
+                                        {"decode_seconds", stage(Stage::decode)},
+                                        {"warp_seconds", stage(Stage::warp)},
+                                        {"filter_seconds", stage(Stage::filter)},
+                                        {"encode_seconds", stage(Stage::encode)},
+                                        {"error_seconds", stage(Stage::error)},
+                                        {"store_seconds", stage(Stage::store)}};
     if (auto ok = write_text(json, out.dump(2) + "\n"); !ok) return report_error("scree build", ok.error());
     return 0;
 }

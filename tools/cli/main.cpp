@@ -14,6 +14,7 @@
 #include "tools/cli/info_command.h"
 #include "tools/cli/samples_command.h"
 #include "tools/cli/synth_command.h"
+#include "tools/cli/update_command.h"
 #include "tools/verify/verify_command.h"
 
 namespace {
@@ -23,9 +24,10 @@ struct Command {
     int (*run)(int, char**);
 };
 
-constexpr std::array<Command, 7> kCommands{{
+constexpr std::array<Command, 8> kCommands{{
     {"synth", "make a mountain landscape to try things on", scree::run_synth},
     {"build", "cut a DEM and an image into a pyramid", scree::run_build},
+    {"update", "lay new, changed or removed sources over a store", scree::run_update},
     {"info", "say what a store holds", scree::run_info},
     {"height", "say how high the terrain is at points, or where a ray meets it", scree::run_height},
     {"verify", "check a store: bounds, edges, checksums, completeness", scree::run_verify},

@@ -110,6 +110,11 @@ Result<PlaneBox> box_of(const PlacedFile& file, const Crs& to) {
     return box;
 }
 
+Result<void> check_unchanged(const PlacedFile& file, const ImageInfo& now) {
+    if (file.info.width == now.width && file.info.height == now.height && file.info.channels == now.channels) return {};
+    return Error{ErrorCode::input, fmt::format("{}: has changed while it was read", file.path)};
+}
+
 void turn_towards(double longitude, PlacedFile& file) {
     if (!file.crs.geographic()) return;
     const double middle =

@@ -52,6 +52,9 @@ struct PlaneBox {
 };
 Result<PlaneBox> box_of(const PlacedFile& file, const Crs& to);
 
+/// ErrorCode::input where a file that is opened again is not what it was.
+Result<void> check_unchanged(const PlacedFile& file, const ImageInfo& now);
+
 /// Brings the file's longitudes within 180 degrees of `longitude`; nothing for a projected CRS.
 void turn_towards(double longitude, PlacedFile& file);
 

@@ -11,34 +11,19 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
-#include <type_traits>
 
 namespace scree {
 namespace {
-
-constexpr std::uint32_t kOpaque = 128;
 
 Error io_error(const std::string& path, const char* what) {
     return {ErrorCode::io, fmt::format("{}: {} the temporary raster: {}", path, what,
                                        errno != 0 ? std::strerror(errno) : "it ends early")};
 }
 
-template <class T>
-bool replaces(T fresh, T held) {
-    if constexpr (std::is_floating_point_v<T>)
-        return HeightCell::replaces(fresh, held);
-    else
-        return ColourCell::replaces(fresh, held);
-}
-
 }  // namespace
 
 bool HeightCell::replaces(double fresh, double held) {
     return std::isfinite(fresh) || (std::isnan(fresh) && !std::isfinite(held));
-}
-
-bool ColourCell::replaces(std::uint32_t fresh, std::uint32_t held) {
-    return fresh >> 24 >= kOpaque || fresh >> 24 > held >> 24;
 }
 
 template <class T>
@@ -117,7 +102,7 @@ Result<void> RasterSpool<T>::lay(std::int64_t column, std::int64_t row, std::int
                 const T* from = values.data() + (y - row) * columns + (left - column);
                 T* to = block_.data() + (y - by * kBlock) * kBlock + (left - bx * kBlock);
                 for (std::int64_t x = 0; x < right - left; ++x) {
-                    if (!replaces<T>(from[x], to[x])) continue;
+                    if (!HeightCell::replaces(from[x], to[x])) continue;
                     to[x] = from[x];
                     changed = true;
                 }
@@ -177,6 +162,5 @@ std::vector<typename RasterSpool<T>::Corner> RasterSpool<T>::corners() const {
 
 template class RasterSpool<float>;
 template class RasterSpool<double>;
-template class RasterSpool<std::uint32_t>;
 
 }  // namespace scree

@@ -1,5 +1,5 @@
-// A temporary raster of any size: 64 x 64 blocks in an unlinked file, where only what was written takes room. One
-// thread writes; once it is done any number of threads may read.
+// A temporary raster of heights of any size: 64 x 64 blocks in an unlinked file, where only what was written takes
+// room. One thread writes; once it is done any number of threads may read.
 #pragma once
 
 #include <cstdint>
@@ -13,14 +13,9 @@
 
 namespace scree {
 
-/// What stands where nothing was written, and what may replace what.
-/// Heights: -infinity = no file reaches here, NaN = a file has a void here, else a value.
+/// What may replace what: -infinity = no file reaches here, NaN = a file has a void here, else a value.
 struct HeightCell {
     static bool replaces(double fresh, double held);
-};
-/// Colours (RGBA, R lowest byte): 0 = nothing; the later of two pixels with alpha >= 128 lies on top.
-struct ColourCell {
-    static bool replaces(std::uint32_t fresh, std::uint32_t held);
 };
 
 template <class T>

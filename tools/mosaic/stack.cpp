@@ -6,20 +6,18 @@
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <type_traits>
 
 #include "tools/mosaic/height_shift.h"
+#include "tools/mosaic/source_window.h"
 #include "tools/source/suspect_values.h"
 
 namespace scree {
 namespace {
 
 constexpr std::int64_t kBandRows = RasterSpool<float>::kBlock;
-constexpr std::int64_t kMaxWindow = std::int64_t{1} << 18;  // samples held to make a rectangle; larger ones are halved
-constexpr double kOnGrid = 1e-3;                            // samples
+constexpr double kOnGrid = 1e-3;  // samples
 constexpr double kUncovered = -std::numeric_limits<double>::infinity();
 constexpr double kVoid = std::numeric_limits<double>::quiet_NaN();
-constexpr std::uint32_t kOpaque = 128;
 
 // Points (i + c * stride, j + r * stride).
 struct Rectangle {
@@ -44,43 +42,8 @@ struct LayerOnGrid {
 
 Error interrupted() { return {ErrorCode::interrupted, "stopped; nothing was written"}; }
 
-template <class T>
-using Resampled = std::conditional_t<std::is_floating_point_v<T>, double, std::uint32_t>;
-
-// What the kernel and the margins of rounding may read around the points' own samples.
-struct Window {
-    std::int64_t column = 0, row = 0, columns = 0, rows = 0;
-    std::int64_t count() const { return columns * rows; }
-};
-
-std::optional<Window> window_of(const SourcePoints& points, const Layer& layer, const ResampleRule& rule) {
-    double west = std::numeric_limits<double>::infinity(), east = -west, north = west, south = -west;
-    for (std::size_t k = 0; k < points.column.size(); ++k) {
-        const double c = points.column[k], r = points.row[k];
-        if (!std::isfinite(c) || !std::isfinite(r)) continue;
-        west = std::min(west, c);
-        east = std::max(east, c);
-        north = std::min(north, r);
-        south = std::max(south, r);
-    }
-    const auto columns = static_cast<double>(layer.columns), rows = static_cast<double>(layer.rows);
-    west = std::max(west, -1.0);
-    north = std::max(north, -1.0);
-    east = std::min(east, columns);
-    south = std::min(south, rows);
-    if (!(west <= east && north <= south)) return std::nullopt;
-    const std::int64_t reach_x = kernel_reach(rule.kernel, rule.shrink.columns) + 1;
-    const std::int64_t reach_y = kernel_reach(rule.kernel, rule.shrink.rows) + 1;
-    Window w;
-    w.column = static_cast<std::int64_t>(std::floor(west)) - reach_x;
-    w.row = static_cast<std::int64_t>(std::floor(north)) - reach_y;
-    w.columns = static_cast<std::int64_t>(std::ceil(east)) + reach_x + 1 - w.column;
-    w.rows = static_cast<std::int64_t>(std::ceil(south)) + reach_y + 1 - w.row;
-    return w;
-}
-
 // Void or uncovered, for points that got no height: what the nearest sample is.
-double kind_of_nothing(const std::vector<double>& window, const Window& w, double column, double row) {
+double kind_of_nothing(const std::vector<double>& window, const SampleRectangle& w, double column, double row) {
     if (!std::isfinite(column) || !std::isfinite(row)) return kUncovered;
     const auto c = static_cast<std::int64_t>(std::nearbyint(column)) - w.column;
     const auto r = static_cast<std::int64_t>(std::nearbyint(row)) - w.row;
@@ -90,17 +53,10 @@ double kind_of_nothing(const std::vector<double>& window, const Window& w, doubl
 
 bool is_void_or_value(double v) { return v != kUncovered; }
 
-std::int64_t chunk_of(std::int64_t i) {
-    return i >= 0 ? i / WarpMap::kChunk : -((WarpMap::kChunk - 1 - i) / WarpMap::kChunk);
-}
-std::int64_t chunk_middle(std::int64_t i) { return chunk_of(i) * WarpMap::kChunk + WarpMap::kChunk / 2; }
-
 // The layer's values at points that have none yet. The area lies within one chunk of the map.
 template <class T>
 class LayerSampler {
 public:
-    using Value = Resampled<T>;
-
     LayerSampler(const LayerOnGrid<T>& layer, const Rectangle& area) : layer_(layer) {
         const auto count = static_cast<std::size_t>(area.count());
         columns_.resize(count);
@@ -118,33 +74,26 @@ public:
                  layer.spooled->layer.rows};
     }
 
-    std::optional<Window> window() const { return window_of(points_, layer_.spooled->layer, rule_); }
+    std::optional<SampleRectangle> window() const { return source_window(points_, layer_.spooled->layer, rule_); }
 
-    Result<void> overlay(const Window& w, std::span<Value> out) {
+    Result<void> overlay(const SampleRectangle& w, std::span<double> out) {
         // The boxes of scattered files are mostly empty.
         if (!layer_.spooled->spool->holds_any(w.column, w.row, w.columns, w.rows)) return {};
         const auto count = static_cast<std::size_t>(w.count());
         std::vector<T> stored(count);
         if (auto ok = layer_.spooled->spool->read(w.column, w.row, w.columns, w.rows, stored); !ok) return ok;
-        std::vector<Value> values(stored.begin(), stored.end());
-        std::vector<Value> fresh(out.size());
-        if constexpr (std::is_floating_point_v<T>) {
-            std::vector<double> finite = values;
-            for (double& v : finite)
-                if (!std::isfinite(v)) v = kVoid;
-            resample_heights({w.column, w.row, w.columns, w.rows, finite}, points_, rule_, fresh);
-            for (std::size_t k = 0; k < out.size(); ++k) {
-                if (std::isfinite(out[k])) continue;
-                const double v = std::isfinite(fresh[k]) ? fresh[k] : kind_of_nothing(values, w, columns_[k], rows_[k]);
-                if (std::isfinite(fresh[k]))
-                    out[k] = v;
-                else if (is_void_or_value(v))
-                    out[k] = kVoid;
-            }
-        } else {
-            resample_colours({w.column, w.row, w.columns, w.rows, values}, points_, rule_, fresh);
-            for (std::size_t k = 0; k < out.size(); ++k)
-                if (out[k] == 0 && fresh[k] >> 24 >= kOpaque) out[k] = fresh[k] | 0xFF000000U;
+        const std::vector<double> values(stored.begin(), stored.end());
+        std::vector<double> finite = values, fresh(out.size());
+        for (double& v : finite)
+            if (!std::isfinite(v)) v = kVoid;
+        resample_heights({w.column, w.row, w.columns, w.rows, finite}, points_, rule_, fresh);
+        for (std::size_t k = 0; k < out.size(); ++k) {
+            if (std::isfinite(out[k])) continue;
+            const double v = std::isfinite(fresh[k]) ? fresh[k] : kind_of_nothing(values, w, columns_[k], rows_[k]);
+            if (std::isfinite(fresh[k]))
+                out[k] = v;
+            else if (is_void_or_value(v))
+                out[k] = kVoid;
         }
         return {};
     }
@@ -168,16 +117,11 @@ private:
     ResampleRule rule_;
 };
 
-template <class T>
-bool complete(std::span<const Resampled<T>> out) {
-    if constexpr (std::is_floating_point_v<T>)
-        return std::all_of(out.begin(), out.end(), [](double v) { return std::isfinite(v); });
-    else
-        return std::all_of(out.begin(), out.end(), [](std::uint32_t v) { return v != 0; });
+bool complete(std::span<const double> out) {
+    return std::all_of(out.begin(), out.end(), [](double v) { return std::isfinite(v); });
 }
 
-template <class V>
-void copy_part(std::span<const V> from, const Rectangle& from_area, std::span<V> to, const Rectangle& to_area,
+void copy_part(std::span<const double> from, const Rectangle& from_area, std::span<double> to, const Rectangle& to_area,
                const Rectangle& part) {
     for (std::int64_t r = 0; r < part.rows; ++r) {
         const auto at = [&](const Rectangle& area) {
@@ -188,11 +132,11 @@ void copy_part(std::span<const V> from, const Rectangle& from_area, std::span<V>
 }
 
 template <class T>
-Result<void> overlay_layer(const LayerOnGrid<T>& layer, const Rectangle& area, std::span<Resampled<T>> out) {
+Result<void> overlay_layer(const LayerOnGrid<T>& layer, const Rectangle& area, std::span<double> out) {
     LayerSampler<T> sampler(layer, area);
     const auto window = sampler.window();
     if (!window) return {};
-    if (window->count() <= kMaxWindow || area.count() == 1) return sampler.overlay(*window, out);
+    if (window->count() <= kMostWindowSamples || area.count() == 1) return sampler.overlay(*window, out);
     // Far more samples than points: quarter by quarter.
     Rectangle first = area, second = area;
     if (area.columns >= area.rows) {
@@ -205,24 +149,20 @@ Result<void> overlay_layer(const LayerOnGrid<T>& layer, const Rectangle& area, s
         second.j += first.rows * area.stride;
     }
     for (const Rectangle& part : {first, second}) {
-        std::vector<Resampled<T>> values(static_cast<std::size_t>(part.count()));
-        copy_part<Resampled<T>>(out, area, values, part, part);
+        std::vector<double> values(static_cast<std::size_t>(part.count()));
+        copy_part(out, area, values, part, part);
         if (auto ok = overlay_layer<T>(layer, part, values); !ok) return ok;
-        copy_part<Resampled<T>>(values, part, out, area, part);
+        copy_part(values, part, out, area, part);
     }
     return {};
 }
 
 template <class T>
-Result<void> sample_chunk(const std::vector<LayerOnGrid<T>>& layers, const Rectangle& area,
-                          std::span<Resampled<T>> out) {
-    if constexpr (std::is_floating_point_v<T>)
-        std::fill(out.begin(), out.end(), kUncovered);
-    else
-        std::fill(out.begin(), out.end(), 0U);
+Result<void> sample_chunk(const std::vector<LayerOnGrid<T>>& layers, const Rectangle& area, std::span<double> out) {
+    std::fill(out.begin(), out.end(), kUncovered);
     for (auto layer = layers.rbegin(); layer != layers.rend(); ++layer) {
         if (auto ok = overlay_layer<T>(*layer, area, out); !ok) return ok;
-        if (complete<T>(out)) break;
+        if (complete(out)) break;
     }
     return {};
 }
@@ -238,9 +178,8 @@ Share share_from(std::int64_t first, std::int64_t begin, std::int64_t count, std
 }
 
 template <class T>
-Result<void> sample_layers(const std::vector<LayerOnGrid<T>>& layers, const Rectangle& area,
-                           std::span<Resampled<T>> out) {
-    std::vector<Resampled<T>> values;
+Result<void> sample_layers(const std::vector<LayerOnGrid<T>>& layers, const Rectangle& area, std::span<double> out) {
+    std::vector<double> values;
     for (Share down; down.first < area.rows; down.first += down.count) {
         down = share_from(down.first, area.j, area.rows, area.stride);
         for (Share across; across.first < area.columns; across.first += across.count) {
@@ -249,7 +188,7 @@ Result<void> sample_layers(const std::vector<LayerOnGrid<T>>& layers, const Rect
                                  down.count, area.stride};
             values.resize(static_cast<std::size_t>(part.count()));
             if (auto ok = sample_chunk<T>(layers, part, values); !ok) return ok;
-            copy_part<Resampled<T>>(values, part, out, area, part);
+            copy_part(values, part, out, area, part);
         }
     }
     return {};
@@ -320,14 +259,6 @@ private:
     std::vector<double> values_;
 };
 
-bool same_size(const PlacedFile& file, const ImageInfo& now) {
-    return file.info.width == now.width && file.info.height == now.height && file.info.channels == now.channels;
-}
-
-Error changed(const PlacedFile& file) {
-    return {ErrorCode::input, fmt::format("{}: has changed while it was read", file.path)};
-}
-
 template <class T>
 Result<SpooledLayer<T>> empty_layer(Layer layer, const StackOptions& options, T nothing) {
     auto spool = RasterSpool<T>::create(options.temporary + ".layer", layer.columns, layer.rows, nothing);
@@ -360,7 +291,7 @@ Result<std::vector<SpooledLayer<T>>> read_heights(const std::vector<PlacedFile>&
             const PlacedFile& file = files[member.file];
             auto dem = open_heights(file.path, options.open);
             if (!dem) return dem.error();
-            if (!same_size(file, (*dem)->info())) return changed(file);
+            if (auto same = check_unchanged(file, (*dem)->info()); !same) return same.error();
             std::optional<HeightShift> shift;
             if (file.datum_change) {
                 auto made = HeightShift::make(file);
@@ -416,7 +347,6 @@ bool on_grid(const Layer& layer, const TargetGrid& grid, const Crs& grid_crs) {
 }
 
 std::int64_t height_stack_bytes(const std::vector<PlacedFile>& files) { return samples_of(files) * 8; }
-std::int64_t image_stack_bytes(const std::vector<PlacedFile>& files) { return samples_of(files) * 4; }
 
 struct HeightStack::Impl {
     Kernel kernel = Kernel::bilinear;
@@ -509,44 +439,6 @@ Result<void> HeightGrid::sample(std::int64_t i, std::int64_t j, std::int64_t col
     const Rectangle area{i, j, columns, rows, stride};
     return impl_->wide.empty() ? sample_layers<float>(impl_->narrow, area, out)
                                : sample_layers<double>(impl_->wide, area, out);
-}
-
-struct ImageStack::Impl {
-    std::vector<SpooledLayer<std::uint32_t>> layers;
-    std::vector<LayerOnGrid<std::uint32_t>> placed;
-};
-
-ImageStack::ImageStack(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-ImageStack::~ImageStack() = default;
-
-Result<std::unique_ptr<ImageStack>> ImageStack::read(const std::vector<PlacedFile>& files, std::vector<Layer> layers,
-                                                     const TargetGrid& grid, const Crs& grid_crs,
-                                                     const StackOptions& options, const ReadProgress& progress) {
-    auto impl = std::make_unique<Impl>();
-    for (Layer& layer : layers) {
-        auto fresh = empty_layer<std::uint32_t>(std::move(layer), options, 0U);
-        if (!fresh) return fresh.error();
-        for (const LayerMember& member : fresh->layer.members) {
-            const PlacedFile& file = files[member.file];
-            auto image = ImageSource::open(file.path, options.open);
-            if (!image) return image.error();
-            if (!same_size(file, (*image)->info())) return changed(file);
-            const auto read = [&](std::int64_t begin, std::int64_t end, std::span<std::uint32_t> out) {
-                return (*image)->read_rgba8(begin, end, {reinterpret_cast<std::uint8_t*>(out.data()), out.size() * 4});
-            };
-            if (auto ok = lay_file<std::uint32_t>(file, member, *fresh->spool, read, progress); !ok) return ok.error();
-        }
-        impl->layers.push_back(std::move(*fresh));
-    }
-    auto placed = place_on(impl->layers, grid, grid_crs, options.kernel);
-    if (!placed) return placed.error();
-    impl->placed = std::move(*placed);
-    return std::unique_ptr<ImageStack>(new ImageStack(std::move(impl)));
-}
-
-Result<void> ImageStack::sample(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
-                                std::span<std::uint32_t> out) const {
-    return sample_layers<std::uint32_t>(impl_->placed, {i, j, columns, rows, 1}, out);
 }
 
 }  // namespace scree

@@ -32,6 +32,7 @@ using ReadProgress = std::function<bool(std::int64_t samples)>;
 
 /// Bytes of temporary disk that reading these layers may take.
 std::int64_t height_stack_bytes(const std::vector<PlacedFile>& files);
+/// Where everything is read at once; ImageStack::temporary_bytes where it is not.
 std::int64_t image_stack_bytes(const std::vector<PlacedFile>& files);
 
 class HeightGrid;
@@ -97,15 +98,43 @@ private:
     std::unique_ptr<Impl> impl_;
 };
 
-/// Colours as RGBA (R lowest byte): the topmost layer's pixel with alpha >= 128, opaque; 0 where there is none.
+/// Colours as RGBA (R lowest byte): the topmost layer's pixel with alpha >= 128, opaque; 0 where there is none. What a
+/// point gets depends on the files and the grid alone, not on what is asked for and when.
+///
+/// North-up files in the grid's CRS wait in memory, whole rows of them (as many as are prepared and not released);
+/// others, those that are shrunk much, and layers of very many files side by side wait in a temporary file.
 class ImageStack {
 public:
+    /// Opens nothing yet: files are decoded as points of the grid are asked for.
+    static Result<std::unique_ptr<ImageStack>> open(const std::vector<PlacedFile>& files, std::vector<Layer> layers,
+                                                    const TargetGrid& grid, const Crs& grid_crs,
+                                                    const StackOptions& options);
+    /// The same, with everything decoded, on disk.
     static Result<std::unique_ptr<ImageStack>> read(const std::vector<PlacedFile>& files, std::vector<Layer> layers,
                                                     const TargetGrid& grid, const Crs& grid_crs,
                                                     const StackOptions& options, const ReadProgress& progress);
     ~ImageStack();
+
+    /// Makes the points [i, i + columns) x [j, j + rows) ready, until they are released: decodes what they need and is
+    /// not there yet. One thread at a time, no sample() meanwhile. Cheapest in bands across the grid from north to
+    /// south. Errors: those of the files, ErrorCode::io, ErrorCode::interrupted (what is there stays).
+    Result<void> prepare(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
+                         const ReadProgress& progress);
+    /// Nothing in rows north of j will be asked for again: what only they needed may go. Alone, as prepare().
+    void release_north_of(std::int64_t j);
+    /// Points that are prepared. Any thread. Errors: ErrorCode::io.
     Result<void> sample(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
                         std::span<std::uint32_t> out) const;
+
+    /// Memory that bands of 64 grid rows take, each prepared when the one before it is released, `points_wide` across:
+    /// pixels that wait and decoders' bands, without what sample() takes on each thread.
+    static std::int64_t bytes_needed(const std::vector<PlacedFile>& files, const std::vector<Layer>& layers,
+                                     const TargetGrid& grid, const Crs& grid_crs, std::int64_t points_wide);
+    /// Temporary disk at most.
+    static std::int64_t temporary_bytes(const std::vector<PlacedFile>& files, const std::vector<Layer>& layers,
+                                        const TargetGrid& grid, const Crs& grid_crs);
+    /// Temporary disk that it takes now.
+    std::int64_t temporary_bytes_taken() const;
 
 private:
     struct Impl;

@@ -14,18 +14,25 @@ constexpr size_t kLanes = 16;
 inline Ints splat(int value) { return _mm512_set1_epi32(value); }
 inline Floats splat(float value) { return _mm512_set1_ps(value); }
 inline Ints zero() { return _mm512_setzero_si512(); }
+inline Ints load(const uint8_t* p) { return _mm512_loadu_si512(p); }
+inline Ints first_of_16_bytes(Ints a) { return _mm512_shuffle_epi32(a, _MM_PERM_AAAA); }
+inline bool is_zero(Ints a) { return _mm512_test_epi32_mask(a, a) == 0; }
 inline Ints add16(Ints a, Ints b) { return _mm512_add_epi16(a, b); }
+inline Ints sub16(Ints a, Ints b) { return _mm512_sub_epi16(a, b); }
+inline Ints mul_low16(Ints a, Ints b) { return _mm512_mullo_epi16(a, b); }
 inline Ints add32(Ints a, Ints b) { return _mm512_add_epi32(a, b); }
 inline Ints min16(Ints a, Ints b) { return _mm512_min_epi16(a, b); }
 inline Ints max16(Ints a, Ints b) { return _mm512_max_epi16(a, b); }
-inline Ints mul_high16(Ints a, Ints b) { return _mm512_mulhi_epi16(a, b); }
 inline Ints mul_add_pairs(Ints a, Ints b) { return _mm512_madd_epi16(a, b); }
-inline Ints increment_if_greater16(Ints count, Ints a, Ints b) {
-    return _mm512_mask_add_epi16(count, _mm512_cmpgt_epi16_mask(a, b), count, _mm512_set1_epi16(1));
-}
+inline Ints add_products(Ints sum, Ints a, Ints b) { return _mm512_dpwssd_epi32(sum, a, b); }
+inline Ints mul_round16(Ints a, Ints b) { return _mm512_mulhrs_epi16(a, b); }
 template <int kBits>
 inline Ints shift_left16(Ints a) {
     return _mm512_slli_epi16(a, kBits);
+}
+template <int kBits>
+inline Ints shift_right16(Ints a) {
+    return _mm512_srli_epi16(a, kBits);
 }
 template <int kBits>
 inline Ints shift_left32(Ints a) {
@@ -39,11 +46,16 @@ template <int kBits>
 inline Ints shift_right_signed32(Ints a) {
     return _mm512_srai_epi32(a, kBits);
 }
+template <int kBits>
+inline Ints shift_right_signed16(Ints a) {
+    return _mm512_srai_epi16(a, kBits);
+}
 inline Floats to_floats(Ints a) { return _mm512_cvtepi32_ps(a); }
 inline Ints truncate(Floats a) { return _mm512_cvttps_epi32(a); }
 inline Floats minimum(Floats a, Floats b) { return _mm512_min_ps(a, b); }
 inline Floats maximum(Floats a, Floats b) { return _mm512_max_ps(a, b); }
 inline Floats magnitude(Floats a) { return _mm512_abs_ps(a); }
+inline Floats square_root(Floats a) { return _mm512_sqrt_ps(a); }
 
 using Mask = __mmask16;
 inline Mask less(Floats a, Floats b) { return _mm512_cmp_ps_mask(a, b, _CMP_LT_OQ); }
@@ -80,11 +92,16 @@ inline void store_blocks(uint8_t* out, Ints endpoints, Ints selectors) {
 }
 
 #include "tools/pyramid/bc1_kernel_body.h"
+#include "tools/pyramid/bc1_kernel_high_body.h"
 
 }  // namespace
 
 void bc1_kernel_avx512(const uint8_t* rgba, size_t row_bytes, size_t block_count, uint8_t* out) {
-    encode_groups(rgba, row_bytes, block_count, out);
+    encode_groups<encode_batch>(rgba, row_bytes, block_count, out);
+}
+
+void bc1_high_kernel_avx512(const uint8_t* rgba, size_t row_bytes, size_t block_count, uint8_t* out) {
+    encode_groups<encode_high_batch>(rgba, row_bytes, block_count, out);
 }
 
 }  // namespace scree

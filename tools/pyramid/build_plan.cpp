@@ -6,13 +6,14 @@
 #include <bit>
 #include <cmath>
 #include <filesystem>
+#include <set>
 #include <thread>
 #include <tuple>
 
+#include "tools/pyramid/build_record.h"
 #include "tools/pyramid/height_pyramid.h"
 #include "tools/pyramid/height_spool.h"
-#include "tools/pyramid/imagery_rows.h"
-#include "tools/pyramid/texture_pyramid.h"
+#include "tools/pyramid/texture_stage.h"
 #include "tools/source/fingerprint.h"
 #include "tools/source/isolated_decoder.h"
 
@@ -51,12 +52,10 @@ int texture_depth(const Dataset& dataset, double cell_m, double source_texel_m) 
 bool north_up(const Georeference& where) { return where.axis_aligned() && where.column_x > 0 && where.row_y < 0; }
 
 // Files that are read straight through, row by row, need no copy.
-void choose_ways(const BuildOptions& o, BuildPlan& plan) {
+void choose_ways(BuildPlan& plan) {
     const MosaicPlan& m = plan.mosaic;
     plan.heights_in_place = m.base_shift == 0 && m.heights.size() == 1 && m.heights_copied && m.same_units &&
-                            north_up(m.heights.front().where);
-    plan.imagery_in_place = m.imagery.size() == 1 && m.imagery.front().crs.same_as(m.crs) &&
-                            north_up(m.imagery.front().where) && o.kernel == Kernel::bilinear;
+                             north_up(m.heights.front().where);
     plan.integer_heights =
         m.heights_copied && m.same_units &&
         std::all_of(m.heights.begin(), m.heights.end(), [](const PlacedFile& f) { return is_integer(f.info.type); });
@@ -81,18 +80,14 @@ void plan_resources(const BuildOptions& o, BuildPlan& plan) {
     else
         heights = std::max(
             {heights, widest_band_bytes(m.heights, 12), width * 64 * 8 + threads_of(o) * kSamplingBytesAThread});
-    std::int64_t texture = TexturePyramid::bytes_needed(base, d.texture_size_log2, d.texture_deepest_level);
     const std::int64_t texels_wide =
         base.cells_x * static_cast<std::int64_t>(std::ceil(base.spacing_m / d.texel_m(d.texture_deepest_level)));
-    if (plan.imagery_in_place)
-        texture += ImageryRows::bytes_needed(m.imagery.front().info, texels_wide);
-    else if (!m.imagery.empty())
-        texture = std::max(texture + texels_wide * 64 * 4 + threads_of(o) * kSamplingBytesAThread,
-                           widest_band_bytes(m.imagery, 8));
+    std::int64_t texture = TextureStage::bytes_needed(d, texels_wide);
+    if (!m.imagery.empty()) texture += texels_wide * 64 * 4 + threads_of(o) * kSamplingBytesAThread;
     plan.memory_bytes = kProcessBytes + decoder_usage().peak_rss_bytes + std::max(heights, texture);
     plan.temporary_bytes = HeightSpool::bytes_needed(width, rows, plan.wide_heights);
     if (!plan.heights_in_place) plan.temporary_bytes += height_stack_bytes(m.heights);
-    if (!plan.imagery_in_place) plan.temporary_bytes += image_stack_bytes(m.imagery);
+    plan.temporary_bytes += image_stack_bytes(m.imagery);
 
     double height_tiles = 0, texture_tiles = 0;
     for (int level = 0; level <= std::max(base.deepest_level, d.texture_deepest_level); ++level) {
@@ -125,6 +120,70 @@ SourceRecord source_record(const std::string& path, const char* role, const Imag
             info.width,
             info.height,
             fingerprint_of(path)};
+}
+
+Result<std::vector<PlaneBox>> boxes_of(const std::vector<PlacedFile>& files, const Crs& crs) {
+    std::vector<PlaneBox> boxes;
+    for (const PlacedFile& f : files) {
+        auto box = box_of(f, crs);
+        if (!box) return box.error();
+        boxes.push_back(*box);
+    }
+    return boxes;
+}
+
+// Bottom to top where files overlap, by name where they do not: the order of files that do not overlap changes nothing.
+std::vector<std::size_t> canonical_order(const std::vector<PlacedFile>& files, const std::vector<PlaneBox>& boxes) {
+    const auto meet = [&](std::size_t a, std::size_t b) {
+        const PlaneBox &p = boxes[a], &q = boxes[b];
+        return p.west <= q.east && q.west <= p.east && p.south <= q.north && q.south <= p.north;
+    };
+    const auto name = [&](std::size_t k) { return std::filesystem::path(files[k].path).filename().string(); };
+    std::vector<std::size_t> under(files.size());  // how many files that are not yet listed lie below
+    std::vector<std::vector<std::size_t>> over(files.size());
+    for (std::size_t a = 0; a < files.size(); ++a)
+        for (std::size_t b = a + 1; b < files.size(); ++b)
+            if (meet(a, b)) {
+                over[a].push_back(b);
+                ++under[b];
+            }
+    std::set<std::tuple<std::string, std::string, std::size_t>> ready;
+    const auto enter = [&](std::size_t k) {
+        if (under[k] == 0) ready.emplace(name(k), fingerprint_of(files[k].path), k);
+    };
+    for (std::size_t k = 0; k < files.size(); ++k) enter(k);
+    std::vector<std::size_t> order;
+    while (!ready.empty()) {
+        const std::size_t k = std::get<2>(*ready.begin());
+        ready.erase(ready.begin());
+        order.push_back(k);
+        for (const std::size_t above : over[k]) {
+            --under[above];
+            enter(above);
+        }
+    }
+    return order;
+}
+
+// Of each file: what its layer's samples are counted from, and which of its sides are the layer's, where resampling ends
+// otherwise than at a neighbour without samples (SourceRecord::layer).
+std::vector<std::string> layer_names(const std::vector<PlacedFile>& files, const std::vector<Layer>& layers,
+                                     const Crs& crs) {
+    std::vector<std::string> names(files.size());
+    for (const Layer& layer : layers) {
+        const Georeference& w = layer.where;
+        const std::string grid = fmt::format("{}|{}|{}|{}|{}|{}|{}", w.first_x, w.first_y, w.column_x, w.column_y,
+                                             w.row_x, w.row_y, layer.half_sample_rim);
+        for (const LayerMember& member : layer.members) {
+            const PlacedFile& f = files[member.file];
+            const unsigned sides = (member.column == 0 ? kWestSide : 0u) | (member.row == 0 ? kNorthSide : 0u) |
+                                   (member.column + f.info.width == layer.columns ? kEastSide : 0u) |
+                                   (member.row + f.info.height == layer.rows ? kSouthSide : 0u);
+            const unsigned straight = north_up(w) && layer.crs.same_as(crs) ? kStraight : 0u;
+            names[member.file] = fmt::format("{:016x}{:02x}", fingerprint_of_bytes(grid), sides | straight);
+        }
+    }
+    return names;
 }
 
 }  // namespace
@@ -168,19 +227,27 @@ Result<BuildPlan> plan_build(const BuildOptions& o) {
     }
     d.vertical_datum = m.vertical_datum;
     d.attribution = o.attribution;
-    for (const PlacedFile& f : m.heights) d.sources.push_back(source_record(f.path, "heights", f.info));
-    for (const PlacedFile& f : m.imagery) d.sources.push_back(source_record(f.path, "imagery", f.info));
-    // By name: the order of files that do not overlap changes nothing.
-    std::stable_sort(d.sources.begin(), d.sources.end(), [](const SourceRecord& a, const SourceRecord& b) {
-        return std::tie(a.role, a.name, a.fingerprint) < std::tie(b.role, b.name, b.fingerprint);
-    });
+    d.options = options_record(o, m.imagery.empty() ? std::nullopt : plan.open.colours.stretch);
+    for (const auto& [files, layers_of, role] : {std::tuple(&m.heights, &m.height_layers, "heights"),
+                                                 std::tuple(&m.imagery, &m.image_layers, "imagery")}) {
+        auto boxes = boxes_of(*files, m.crs);
+        if (!boxes) return boxes.error();
+        const std::vector<std::string> layers = layer_names(*files, *layers_of, m.crs);
+        for (const std::size_t k : canonical_order(*files, *boxes)) {
+            SourceRecord record = source_record((*files)[k].path, role, (*files)[k].info);
+            const PlaneBox& b = (*boxes)[k];
+            record.box_m = {b.west, b.south, b.east, b.north};
+            record.layer = layers[k];
+            d.sources.push_back(std::move(record));
+        }
+    }
     d.has_imagery = !m.imagery.empty();
     const double cell_m = m.base_lattice().spacing_m, source_texel = d.has_imagery ? m.finest_pixel_m : cell_m;
     d.texture_deepest_level = texture_depth(d, cell_m, source_texel);
     if (!tile_key(d.lattice, {d.texture_deepest_level, 0, 0}))
         return input_error(fmt::format("imagery of {} m a pixel needs texture level {}, beyond the format's keys",
                                        source_texel, d.texture_deepest_level));
-    choose_ways(o, plan);
+    choose_ways(plan);
     plan_resources(o, plan);
     if (plan.memory_bytes > o.memory_bytes)
         return usage_error(fmt::format("--memory {} MiB is not enough for these widths: {} MiB are needed",

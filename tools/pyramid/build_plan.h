@@ -11,6 +11,7 @@
 #include "common/dataset.h"
 #include "common/result.h"
 #include "tools/mosaic/mosaic_plan.h"
+#include "tools/pyramid/bc1_encoder.h"
 #include "tools/pyramid/void_fill.h"
 
 namespace scree {
@@ -30,21 +31,25 @@ struct BuildOptions : HeightReading {
     std::optional<double> height_quantum_m;
     int tile_size = 33;
     int texture_size = 256;
-    int threads = 0;                                      ///< 0: all cores
-    std::int64_t memory_bytes = std::int64_t{256} << 20;  ///< ceiling of the process's resident memory
+    TextureQuality texture_quality = TextureQuality::normal;  ///< high: DXT1 takes ten to twenty times as long
+    int threads = 0;                                          ///< 0: all cores
+    std::int64_t memory_bytes = std::int64_t{256} << 20;      ///< ceiling of the process's resident memory
     std::string attribution;
     bool force = false;
     bool quiet = false;
 };
+
+/// The last two hexadecimal digits of SourceRecord::layer: which sides of a file are sides of its layer, and whether
+/// they run north and east in the dataset's CRS.
+inline constexpr unsigned kWestSide = 1, kNorthSide = 2, kEastSide = 4, kSouthSide = 8, kStraight = 16;
 
 struct BuildPlan {
     explicit BuildPlan(MosaicPlan m) : mosaic(std::move(m)) {}
 
     MosaicPlan mosaic;
     OpenOptions open;  ///< how files are opened
-    /// One file whose rows are the lattice's rows: it is read straight through, without a copy on disk.
+    /// One DEM whose rows are the lattice's rows: it is read straight through, without a copy on disk.
     bool heights_in_place = false;
-    bool imagery_in_place = false;
     bool integer_heights = false;           ///< every height is an integer of the file's, nothing is resampled
     bool wide_heights = false;              ///< values do not fit float32
     Dataset dataset;                        ///< lattice, CRS, texture depth; heights still unknown

@@ -8,6 +8,7 @@
 #include <mutex>
 
 #include "common/store/height_codec.h"
+#include "tools/pyramid/sample_range.h"
 
 namespace scree {
 namespace {
@@ -105,9 +106,9 @@ void let_errors_grow(HeightBounds& bounds, int tile_cells_log2) {
 HeightBounds bounds_over(std::span<const HeightBounds> children, std::span<const std::int32_t> samples,
                          double coarsest_error, int tile_cells_log2) {
     HeightBounds bounds;
-    const auto [low, high] = std::minmax_element(samples.begin(), samples.end());
-    bounds.min_n = *low;
-    bounds.max_n = *high;
+    const SampleRange range = range_of(samples);
+    bounds.min_n = range.low;
+    bounds.max_n = range.high;
     for (const HeightBounds& child : children) {
         bounds.min_n = std::min(bounds.min_n, child.min_n);
         bounds.max_n = std::max(bounds.max_n, child.max_n);
@@ -119,25 +120,6 @@ HeightBounds bounds_over(std::span<const HeightBounds> children, std::span<const
     bounds.error_n[static_cast<std::size_t>(tile_cells_log2 - 1)] = round_up_to_float(coarsest_error);
     let_errors_grow(bounds, tile_cells_log2);
     return bounds;
-}
-
-void DeepPresence::note_leaf(TileId leaf, std::span<const std::uint8_t> cells) {
-    if (cells.empty()) return;
-    std::vector<bool> bits(cells.size());
-    for (std::size_t k = 0; k < cells.size(); ++k) bits[k] = cells[k] != 0;
-    const std::lock_guard lock(mutex_);
-    partial_.emplace(leaf, std::move(bits));
-}
-
-void DeepPresence::note_stored(TileId id) {
-    if (id.level > deepest_noted_level_) return;
-    const std::lock_guard lock(mutex_);
-    stored_.insert(id);
-}
-
-bool DeepPresence::present(TileId leaf, std::size_t cell) const {
-    const auto found = partial_.find(leaf);
-    return found == partial_.end() || found->second[cell];
 }
 
 // On the way down: what the tiles above can draw over this one.
@@ -199,15 +181,13 @@ Result<BranchSummary> DeepBranches::leaf(TileId id, const Place& place) const {
             summary.present_cells += present;
         }
     if (summary.present_cells == m * m) tile.presence.clear();
-    presence_.note_leaf(id, tile.presence);
     if (summary.present_cells == 0) return summary;
     summary.exists = true;
-    presence_.note_stored(id);
     const auto vertices = present_vertices(tile.presence, n);
     const FinestVertices finest{tile.samples.data(), vertices.empty() ? nullptr : vertices.data(), n};
-    const auto [low, high] = std::minmax_element(tile.samples.begin(), tile.samples.end());
-    summary.bounds.min_n = *low;
-    summary.bounds.max_n = *high;
+    const SampleRange range = range_of(tile.samples);
+    summary.bounds.min_n = range.low;
+    summary.bounds.max_n = range.high;
     const auto errors = leaf_errors(finest);
     for (std::size_t g = 0; g < static_cast<std::size_t>(n); ++g)
         summary.bounds.error_n[g] = round_up_to_float(errors[g]);
@@ -221,15 +201,15 @@ Result<BranchSummary> DeepBranches::leaf(TileId id, const Place& place) const {
         }
     for (std::size_t level = 0; level < place.base_blocks->size(); ++level) {
         const AncestorBlock& b = (*place.base_blocks)[level];
-        summary.ancestor_error[level] = coarse_block_error(b.vertices, b.stride << up, (b.offset_i << up) + in_base_i,
-                                                           (b.offset_j << up) + in_base_j, finest);
+        summary.ancestor_error[level] = greatest_block_error(b.vertices, b.stride << up, (b.offset_i << up) + in_base_i,
+                                                             (b.offset_j << up) + in_base_j, finest, errors, 0);
     }
     for (std::size_t k = 0; k < place.deep_blocks.size(); ++k) {
         const int level = place.base.level + 1 + static_cast<int>(k), down = id.level - level;
         const TileId above = ancestor_at(id, level);
         summary.ancestor_error[static_cast<std::size_t>(level)] =
-            coarse_block_error(place.deep_blocks[k], (m / 2) << down, (id.x - (above.x << down)) * m,
-                               (id.y - (above.y << down)) * m, finest);
+            greatest_block_error(place.deep_blocks[k], (m / 2) << down, (id.x - (above.x << down)) * m,
+                                 (id.y - (above.y << down)) * m, finest, errors, 0);
     }
     tile.header.own = summary.bounds;
     if (auto ok = sink_(id, encode_height_tile(tile, n, HeightCodec::plane)); !ok) return ok.error();

@@ -5,10 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
-#include <mutex>
 #include <span>
-#include <unordered_map>
-#include <unordered_set>
 #include <vector>
 
 #include "common/dataset.h"
@@ -61,37 +58,14 @@ struct BranchSummary {
     double worst_quantum_error_m = 0;
 };
 
-/// Which cells of the leaves under refined base tiles are present, and which tiles are stored there: what the textures
-/// must know of them.
-class DeepPresence {
-public:
-    explicit DeepPresence(int deepest_noted_level) : deepest_noted_level_(deepest_noted_level) {}
-
-    /// `cells`: one byte a cell; empty: every cell is present. Any thread.
-    void note_leaf(TileId leaf, std::span<const std::uint8_t> cells);
-    /// A stored tile; noted down to the level given. Any thread.
-    void note_stored(TileId id);
-
-    /// Of a leaf's cell, row-major. After the last note.
-    bool present(TileId leaf, std::size_t cell) const;
-    bool stored(TileId id) const { return stored_.count(id) != 0; }
-
-private:
-    int deepest_noted_level_;
-    std::mutex mutex_;
-    std::unordered_map<TileId, std::vector<bool>, TileIdHash> partial_;
-    std::unordered_set<TileId, TileIdHash> stored_;
-};
-
 /// Takes finished tiles; called from several threads.
-using TileSink = std::function<Result<void>(TileId id, const std::vector<std::uint8_t>& payload)>;
+using TileSink = std::function<Result<void>(TileId id, std::vector<std::uint8_t> payload)>;
 
 class DeepBranches {
 public:
     /// `lattice`: the finest one. The referenced objects must outlive it.
-    DeepBranches(const Lattice& lattice, const DeepTree& tree, const DeepHeights& heights, DeepPresence& presence,
-                 TileSink sink)
-        : lattice_(lattice), tree_(tree), heights_(heights), presence_(presence), sink_(std::move(sink)) {}
+    DeepBranches(const Lattice& lattice, const DeepTree& tree, const DeepHeights& heights, TileSink sink)
+        : lattice_(lattice), tree_(tree), heights_(heights), sink_(std::move(sink)) {}
 
     /// Builds and stores the children of a refined base tile and all below. `blocks`: of the base tile's ancestors and
     /// (last) its own. Any thread.
@@ -110,7 +84,6 @@ private:
     Lattice lattice_;
     const DeepTree& tree_;
     const DeepHeights& heights_;
-    DeepPresence& presence_;
     TileSink sink_;
 };
 

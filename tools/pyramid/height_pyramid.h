@@ -8,17 +8,17 @@
 #include <functional>
 
 #include "common/dataset.h"
-#include "common/store/sqlite_store.h"
 #include "tools/pyramid/deep_branch.h"
+#include "tools/pyramid/height_index.h"
 #include "tools/pyramid/height_quantizer.h"
 #include "tools/pyramid/height_spool.h"
-#include "tools/pyramid/tile_set.h"
+#include "tools/pyramid/tile_writer.h"
 
 namespace scree {
 
 struct HeightPyramidJob {
     HeightSpool* spool = nullptr;
-    SqliteStoreWriter* writer = nullptr;
+    TileWriter* writer = nullptr;
     Lattice lattice;
     HeightQuantizer quantizer;
     std::function<bool(std::int64_t rows_done)> on_rows;  ///< returns false to stop
@@ -26,12 +26,11 @@ struct HeightPyramidJob {
     /// `finest`, whose cells are this one's divided. Null: nowhere.
     const DeepTree* deep_tree = nullptr;
     const DeepHeights* deep_heights = nullptr;
-    DeepPresence* deep_presence = nullptr;
     Lattice finest{};
+    HeightIndex* index = nullptr;  ///< notes every tile; null: nobody wants to know
 };
 
 struct HeightPyramidResult {
-    TileSet tiles;
     std::int64_t tile_count = 0;
     std::int64_t present_cells = 0;
     int coarsest_leaf_level = kMaxLevel;

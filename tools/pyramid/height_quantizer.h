@@ -2,11 +2,21 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
+#include <span>
 
 #include "common/result.h"
 
 namespace scree {
+
+/// What a set of quantised values reaches.
+struct QuantizedRange {
+    std::int32_t min_n = std::numeric_limits<std::int32_t>::max(), max_n = std::numeric_limits<std::int32_t>::min();
+    double worst_error_m = 0;  ///< greatest distance from a raw value to what is stored
+
+    void include(const QuantizedRange& other);
+};
 
 /// z = raw * scale + offset in metres; n = round((z - height_offset) / quantum).
 struct HeightQuantizer {
@@ -19,6 +29,11 @@ struct HeightQuantizer {
     std::int32_t quantize(double raw) const;
     /// Distance from a raw value to what is stored, in metres.
     double error_m(double raw) const;
+    /// Many values at once, and what they reach where `valid` is 1 (empty: everywhere).
+    QuantizedRange quantize(std::span<const float> raw, std::span<const std::uint8_t> valid,
+                            std::span<std::int32_t> out) const;
+    QuantizedRange quantize(std::span<const double> raw, std::span<const std::uint8_t> valid,
+                            std::span<std::int32_t> out) const;
 };
 
 struct QuantizerInput {

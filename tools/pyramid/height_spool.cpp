@@ -10,11 +10,13 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <limits>
+#include <type_traits>
+
+#include "tools/source/value_range.h"
 
 namespace scree {
 namespace {
-
-constexpr std::int64_t kReadChunkBytes = 1 << 20;
 
 std::int64_t bytes_of_sample(bool wide) { return wide ? 8 : 4; }
 
@@ -44,37 +46,57 @@ Result<void> read_at(int fd, const std::string& path, std::span<std::uint8_t> by
     return {};
 }
 
+// --- values on their way to and from the file ---
+
 // +infinity is a void too.
 double as_stored(double v) { return v == INFINITY ? kVoidSample : v; }
 
-void encode(std::span<const double> values, bool wide, std::uint8_t* bytes) {
-    for (std::size_t i = 0; i < values.size(); ++i) {
-        const double value = as_stored(values[i]);
-        if (wide) {
-            std::memcpy(bytes + i * 8, &value, 8);
-        } else {
-            const float v = static_cast<float>(value);
-            std::memcpy(bytes + i * 4, &v, 4);
-        }
-    }
+template <class T>
+std::span<const std::uint8_t> bytes_of(std::span<const T> values) {
+    return {reinterpret_cast<const std::uint8_t*>(values.data()), values.size_bytes()};
+}
+template <class T>
+std::span<std::uint8_t> writable_bytes_of(std::span<T> values) {
+    return {reinterpret_cast<std::uint8_t*>(values.data()), values.size_bytes()};
 }
 
-void decode(const std::uint8_t* bytes, bool wide, std::span<double> values) {
-    if (wide) {
-        std::memcpy(values.data(), bytes, values.size_bytes());
-        return;
+void narrow(std::span<const double> values, std::span<float> out) {
+    for (std::size_t i = 0; i < values.size(); ++i) out[i] = static_cast<float>(as_stored(values[i]));
+}
+
+// In float or double as the file holds them.
+class Scratch {
+public:
+    std::span<float> floats(std::size_t count) { return sized(floats_, count); }
+    std::span<double> doubles(std::size_t count) { return sized(doubles_, count); }
+
+private:
+    template <class T>
+    static std::span<T> sized(std::vector<T>& values, std::size_t count) {
+        if (values.size() < count) values.resize(count);
+        return {values.data(), count};
     }
-    for (std::size_t i = 0; i < values.size(); ++i) {
-        float v = 0;
-        std::memcpy(&v, bytes + i * 4, 4);
-        values[i] = v;
-    }
+    std::vector<float> floats_;
+    std::vector<double> doubles_;
+};
+Scratch& scratch() {
+    thread_local Scratch of_thread;
+    return of_thread;
+}
+
+// --- rows ---
+
+template <class T>
+void mark_valid(std::span<const T> row, std::span<std::uint8_t> valid) {
+    constexpr T kGreatest = std::numeric_limits<T>::max();
+    for (std::size_t i = 0; i < row.size(); ++i)
+        valid[i] = static_cast<std::uint8_t>((row[i] >= -kGreatest) & (row[i] <= kGreatest));
 }
 
 // Linear between the nearest valid neighbours of the row, constant outside them; rounded as stored values are. At least
 // one sample is valid.
-void support_row(std::span<double> row, bool wide) {
-    const auto stored = [wide](double v) { return wide ? v : static_cast<double>(static_cast<float>(v)); };
+template <class T>
+void support_row(std::span<T> row) {
     const std::size_t width = row.size();
     std::size_t i = 0;
     std::ptrdiff_t last_valid = -1;
@@ -92,8 +114,9 @@ void support_row(std::span<double> row, bool wide) {
             for (; i < width; ++i) row[i] = row[static_cast<std::size_t>(last_valid)];
         } else {
             const auto from = static_cast<std::size_t>(last_valid);
-            const double a = row[from], b = row[next], span = static_cast<double>(next - from);
-            for (; i < next; ++i) row[i] = stored(a + (b - a) * (static_cast<double>(i - from) / span));
+            const double a = static_cast<double>(row[from]), b = static_cast<double>(row[next]),
+                         span = static_cast<double>(next - from);
+            for (; i < next; ++i) row[i] = static_cast<T>(a + (b - a) * (static_cast<double>(i - from) / span));
         }
     }
 }
@@ -123,27 +146,60 @@ Result<std::unique_ptr<HeightSpool>> HeightSpool::create(const std::string& path
     return std::unique_ptr<HeightSpool>(new HeightSpool(fd, path, width, height, wide));
 }
 
-Result<void> HeightSpool::append(std::span<const double> row) {
-    const auto j = static_cast<std::int64_t>(rows_.size());
-    assert(static_cast<std::int64_t>(row.size()) == width_ && j < height_);
-    double low = INFINITY, high = -INFINITY;
-    std::int64_t valid = 0;
-    for (const double v : row) {
-        if (!std::isfinite(v)) continue;
-        ++valid;
-        low = std::min(low, v);
-        high = std::max(high, v);
+template <class T>
+void HeightSpool::note_row(std::span<const T> row) {
+    ValueRange<T> range = range_of_values(row);
+    std::size_t finite = row.size();
+    if (!range.all_finite) {
+        range = {};
+        finite = 0;
+        for (const T v : row) {
+            if (!std::isfinite(v)) continue;
+            ++finite;
+            range.low = std::min(range.low, v);
+            range.high = std::max(range.high, v);
+        }
     }
-    if (valid > 0) {
+    if (finite > 0) {
+        const auto low = static_cast<double>(range.low), high = static_cast<double>(range.high);
         summary_.min_raw = summary_.valid_samples == 0 ? low : std::min(summary_.min_raw, low);
         summary_.max_raw = summary_.valid_samples == 0 ? high : std::max(summary_.max_raw, high);
-        summary_.valid_samples += valid;
+        summary_.valid_samples += static_cast<std::int64_t>(finite);
+        last_supporting_ = static_cast<std::int64_t>(rows_.size());
+        if (first_supporting_ < 0) first_supporting_ = last_supporting_;
     }
-    rows_.push_back(valid == width_ ? RowState::all_valid : valid > 0 ? RowState::some_valid : RowState::none_valid);
-    record_.resize(static_cast<std::size_t>(row_bytes_));
-    encode(row, wide_, record_.data());
-    return write_at(file_.fd, path_, record_, j * row_bytes_);
+    rows_.push_back(finite == row.size() ? RowState::all_valid
+                    : finite > 0         ? RowState::some_valid
+                                         : RowState::none_valid);
+    supporting_above_.push_back(last_supporting_);
 }
+
+template <class T>
+Result<void> HeightSpool::append_rows(std::span<const T> rows) {
+    const auto width = static_cast<std::size_t>(width_);
+    assert(rows.size() % width == 0);
+    const std::int64_t offset = static_cast<std::int64_t>(rows_.size()) * row_bytes_;
+    bool all_valid = true;
+    for (auto rest = rows; !rest.empty(); rest = rest.subspan(width)) {
+        note_row(rest.first(width));
+        all_valid = all_valid && rows_.back() == RowState::all_valid;
+    }
+    assert(static_cast<std::int64_t>(rows_.size()) <= height_);
+    if (std::is_same_v<T, double> && !wide_) {
+        const auto record = scratch().floats(rows.size());
+        std::transform(rows.begin(), rows.end(), record.begin(),
+                       [](T v) { return static_cast<float>(as_stored(static_cast<double>(v))); });
+        return write_at(file_.fd, path_, bytes_of<float>(record), offset);
+    }
+    assert(wide_ == (std::is_same_v<T, double>));
+    if (all_valid) return write_at(file_.fd, path_, bytes_of(rows), offset);
+    std::vector<T> record(rows.begin(), rows.end());
+    for (T& v : record) v = static_cast<T>(as_stored(static_cast<double>(v)));
+    return write_at(file_.fd, path_, bytes_of<T>(record), offset);
+}
+
+Result<void> HeightSpool::append(std::span<const double> rows) { return append_rows(rows); }
+Result<void> HeightSpool::append(std::span<const float> rows) { return append_rows(rows); }
 
 Result<HeightSpool::Summary> HeightSpool::finish() {
     assert(static_cast<std::int64_t>(rows_.size()) == height_);
@@ -152,143 +208,112 @@ Result<HeightSpool::Summary> HeightSpool::finish() {
     return summary_;
 }
 
-Result<const std::uint8_t*> HeightSpool::row_bytes(std::int64_t j) {
-    if (j < chunk_first_ || j >= chunk_first_ + chunk_rows_) {
-        const std::int64_t rows = std::clamp<std::int64_t>(kReadChunkBytes / row_bytes_, 1, height_ - j);
-        chunk_rows_ = 0;
-        chunk_.resize(static_cast<std::size_t>(rows * row_bytes_));
-        if (auto ok = read_at(file_.fd, path_, chunk_, j * row_bytes_); !ok) return ok.error();
-        chunk_first_ = j;
-        chunk_rows_ = rows;
-    }
-    return static_cast<const std::uint8_t*>(chunk_.data() + (j - chunk_first_) * row_bytes_);
+std::int64_t HeightSpool::supporting_row(std::int64_t j) const {
+    const std::int64_t above = supporting_above_[static_cast<std::size_t>(j)];
+    return above >= 0 ? above : first_supporting_;
 }
 
-// The rows around j that have no valid sample.
-HeightSpool::Rows HeightSpool::rows_like(std::int64_t j) const {
-    const auto lacks_all = [this](std::int64_t row) {
-        return rows_[static_cast<std::size_t>(row)] == RowState::none_valid;
+template <class T>
+Result<void> HeightSpool::read_stored(std::int64_t i, std::int64_t j, std::span<T> out) const {
+    const std::int64_t offset = j * row_bytes_ + i * bytes_of_sample(wide_);
+    if (wide_ == std::is_same_v<T, double>) return read_at(file_.fd, path_, writable_bytes_of(out), offset);
+    const auto convert = [&](auto stored) -> Result<void> {
+        if (auto ok = read_at(file_.fd, path_, writable_bytes_of(stored), offset); !ok) return ok;
+        std::transform(stored.begin(), stored.end(), out.begin(), [](auto v) { return static_cast<T>(v); });
+        return {};
     };
-    Rows rows{j, j};
-    while (rows.first > 0 && lacks_all(rows.first - 1)) --rows.first;
-    while (rows.end < height_ && lacks_all(rows.end)) ++rows.end;
-    return rows;
+    return wide_ ? convert(scratch().doubles(out.size())) : convert(scratch().floats(out.size()));
 }
 
-std::int64_t HeightSpool::supporting_row(const Rows& lacking) const {
-    assert(lacking.first > 0 || lacking.end < height_);
-    return lacking.first > 0 ? lacking.first - 1 : lacking.end;
-}
-
-// The rows around j without a valid sample share one support.
-Result<void> HeightSpool::load_support(std::int64_t j) {
-    if (j >= support_first_ && j < support_end_) return {};
-    const auto [first, end] = rows_like(j);
-    const std::int64_t source = supporting_row({first, end});
-    support_first_ = support_end_ = 0;
-    support_.resize(static_cast<std::size_t>(width_));
-    if (auto ok = read_samples(0, source, support_); !ok) return ok;
-    support_row(support_, wide_);
-    support_first_ = first;
-    support_end_ = end;
-    return {};
-}
-
-Result<void> HeightSpool::read_row(std::int64_t j, std::span<double> values, std::span<std::uint8_t> valid) {
+template <class T>
+Result<void> HeightSpool::read_supported(std::int64_t j, std::span<T> values, std::span<std::uint8_t> valid) const {
     assert(j >= 0 && j < height_ && static_cast<std::int64_t>(values.size()) >= width_);
     values = values.first(static_cast<std::size_t>(width_));
     valid = valid.first(static_cast<std::size_t>(width_));
     const RowState state = rows_[static_cast<std::size_t>(j)];
-    if (state == RowState::none_valid) {
-        if (auto ok = load_support(j); !ok) return ok;
-        std::copy(support_.begin(), support_.end(), values.begin());
-        std::fill(valid.begin(), valid.end(), std::uint8_t{0});
-        return {};
-    }
-    auto bytes = row_bytes(j);
-    if (!bytes) return bytes.error();
-    decode(*bytes, wide_, values);
-    if (state == RowState::all_valid) {
-        std::fill(valid.begin(), valid.end(), std::uint8_t{1});
-        return {};
-    }
-    std::transform(values.begin(), values.end(), valid.begin(), [](double v) { return std::isfinite(v) ? 1 : 0; });
-    support_row(values, wide_);
+    if (auto ok = read_stored(0, state == RowState::none_valid ? supporting_row(j) : j, values); !ok) return ok;
+    if (state == RowState::some_valid)
+        mark_valid<T>(values, valid);
+    else
+        std::fill(valid.begin(), valid.end(), static_cast<std::uint8_t>(state == RowState::all_valid));
+    if (state != RowState::all_valid) support_row(values);
     return {};
 }
 
-Result<void> HeightSpool::pread_samples(std::int64_t i, std::int64_t j, std::span<double> out,
-                                        std::vector<std::uint8_t>& bytes) const {
-    bytes.resize(out.size() * static_cast<std::size_t>(bytes_of_sample(wide_)));
-    if (auto ok = read_at(file_.fd, path_, bytes, j * row_bytes_ + i * bytes_of_sample(wide_)); !ok) return ok;
-    decode(bytes.data(), wide_, out);
+Result<void> HeightSpool::read_row(std::int64_t j, std::span<double> values, std::span<std::uint8_t> valid) const {
+    if (wide_) return read_supported(j, values, valid);
+    // Support is rounded as stored values are.
+    const auto stored = scratch().floats(static_cast<std::size_t>(width_));
+    if (auto ok = read_supported(j, stored, valid); !ok) return ok;
+    std::copy(stored.begin(), stored.end(), values.begin());
     return {};
+}
+
+Result<void> HeightSpool::read_row(std::int64_t j, std::span<float> values, std::span<std::uint8_t> valid) const {
+    assert(!wide_);
+    return read_supported(j, values, valid);
 }
 
 Result<void> HeightSpool::read_window(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
                                       std::span<double> values, std::span<std::uint8_t> valid) const {
     assert(i >= 0 && j >= 0 && i + columns <= width_ && j + rows <= height_);
     const auto width = static_cast<std::size_t>(columns);
-    std::vector<std::uint8_t> bytes;
     std::vector<double> whole;
+    std::vector<std::uint8_t> whole_valid;
     for (std::int64_t r = 0; r < rows; ++r) {
         const RowState state = rows_[static_cast<std::size_t>(j + r)];
         const std::span<double> row = values.subspan(static_cast<std::size_t>(r) * width, width);
         const std::span<std::uint8_t> flags = valid.subspan(static_cast<std::size_t>(r) * width, width);
-        std::int64_t source = j + r;
-        if (state == RowState::none_valid) {
-            source = supporting_row(rows_like(j + r));
-            std::fill(flags.begin(), flags.end(), std::uint8_t{0});
-        }
-        if (auto ok = pread_samples(i, source, row, bytes); !ok) return ok;
-        if (state != RowState::none_valid)
-            std::transform(row.begin(), row.end(), flags.begin(), [](double v) { return std::isfinite(v) ? 1 : 0; });
-        if (std::all_of(row.begin(), row.end(), [](double v) { return std::isfinite(v); })) continue;
+        const bool absent = state == RowState::none_valid;
+        if (auto ok = read_stored(i, absent ? supporting_row(j + r) : j + r, row); !ok) return ok;
+        mark_valid<double>(row, flags);
+        const bool complete = std::all_of(flags.begin(), flags.end(), [](std::uint8_t v) { return v != 0; });
+        if (absent) std::fill(flags.begin(), flags.end(), std::uint8_t{0});
+        if (complete) continue;
         whole.resize(static_cast<std::size_t>(width_));
-        if (auto ok = pread_samples(0, source, whole, bytes); !ok) return ok;
-        support_row(whole, wide_);
+        whole_valid.resize(whole.size());
+        if (auto ok = read_row(j + r, whole, whole_valid); !ok) return ok;
         std::copy_n(whole.begin() + i, columns, row.begin());
     }
     return {};
 }
 
-Result<void> HeightSpool::read_valid(std::int64_t j, std::span<std::uint8_t> valid) {
+Result<void> HeightSpool::read_valid(std::int64_t j, std::span<std::uint8_t> valid) const {
     const RowState state = rows_[static_cast<std::size_t>(j)];
     valid = valid.first(static_cast<std::size_t>(width_));
     if (state != RowState::some_valid) {
         std::fill(valid.begin(), valid.end(), static_cast<std::uint8_t>(state == RowState::all_valid));
         return {};
     }
-    auto bytes = row_bytes(j);
-    if (!bytes) return bytes.error();
-    for (std::size_t i = 0; i < valid.size(); ++i) {
-        double v = 0;
-        decode(*bytes + static_cast<std::int64_t>(i) * bytes_of_sample(wide_), wide_, {&v, 1});
-        valid[i] = std::isfinite(v) ? 1 : 0;
-    }
-    return {};
+    const auto mark = [&](auto stored) -> Result<void> {
+        if (auto ok = read_stored(0, j, stored); !ok) return ok;
+        mark_valid<typename decltype(stored)::value_type>(stored, valid);
+        return {};
+    };
+    return wide_ ? mark(scratch().doubles(valid.size())) : mark(scratch().floats(valid.size()));
 }
 
 bool HeightSpool::may_lack_samples(std::int64_t j) const {
     return rows_[static_cast<std::size_t>(j)] != RowState::all_valid;
 }
 
-Result<void> HeightSpool::read_samples(std::int64_t i, std::int64_t j, std::span<double> out) {
+Result<void> HeightSpool::read_samples(std::int64_t i, std::int64_t j, std::span<double> out) const {
     assert(i >= 0 && i + static_cast<std::int64_t>(out.size()) <= width_ && j >= 0 && j < height_);
-    record_.resize(out.size() * static_cast<std::size_t>(bytes_of_sample(wide_)));
-    if (auto ok = read_at(file_.fd, path_, record_, j * row_bytes_ + i * bytes_of_sample(wide_)); !ok) return ok;
-    decode(record_.data(), wide_, out);
-    return {};
+    return read_stored(i, j, out);
 }
 
 Result<void> HeightSpool::write_samples(std::int64_t i, std::int64_t j, std::span<const double> values) {
     assert(i >= 0 && i + static_cast<std::int64_t>(values.size()) <= width_ && j >= 0 && j < height_);
     assert(rows_[static_cast<std::size_t>(j)] != RowState::none_valid);
-    chunk_rows_ = 0;
-    support_first_ = support_end_ = 0;
-    record_.resize(values.size() * static_cast<std::size_t>(bytes_of_sample(wide_)));
-    encode(values, wide_, record_.data());
-    return write_at(file_.fd, path_, record_, j * row_bytes_ + i * bytes_of_sample(wide_));
+    const std::int64_t offset = j * row_bytes_ + i * bytes_of_sample(wide_);
+    if (wide_) {
+        const auto record = scratch().doubles(values.size());
+        std::transform(values.begin(), values.end(), record.begin(), as_stored);
+        return write_at(file_.fd, path_, bytes_of<double>(record), offset);
+    }
+    const auto record = scratch().floats(values.size());
+    narrow(values, record);
+    return write_at(file_.fd, path_, bytes_of<float>(record), offset);
 }
 
 }  // namespace scree

@@ -41,24 +41,28 @@ public:
                                                        bool wide);
     static std::int64_t bytes_needed(std::int64_t width, std::int64_t height, bool wide);
 
-    /// Appends the next row: -infinity marks an uncovered sample, NaN and +infinity a void.
-    Result<void> append(std::span<const double> row);
+    /// Appends the next row, or several: -infinity marks an uncovered sample, NaN and +infinity a void. Floats only
+    /// where the spool is not wide.
+    Result<void> append(std::span<const double> rows);
+    Result<void> append(std::span<const float> rows);
     /// After the last row. Errors: ErrorCode::input when no sample is valid.
     Result<Summary> finish();
 
-    /// Row j: raw values, support where there is none, and one byte a sample, 1 = valid.
-    Result<void> read_row(std::int64_t j, std::span<double> values, std::span<std::uint8_t> valid);
+    /// Row j: raw values, support where there is none, and one byte a sample, 1 = valid. Floats only where the spool is
+    /// not wide. This and the following: any thread, while nothing is written.
+    Result<void> read_row(std::int64_t j, std::span<double> values, std::span<std::uint8_t> valid) const;
+    Result<void> read_row(std::int64_t j, std::span<float> values, std::span<std::uint8_t> valid) const;
     /// Validity alone.
-    Result<void> read_valid(std::int64_t j, std::span<std::uint8_t> valid);
+    Result<void> read_valid(std::int64_t j, std::span<std::uint8_t> valid) const;
 
-    /// Samples [i, i + columns) x [j, j + rows) as read_row gives them. Any thread, while nothing is written.
+    /// Samples [i, i + columns) x [j, j + rows) as read_row gives them.
     Result<void> read_window(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
                              std::span<double> values, std::span<std::uint8_t> valid) const;
 
     /// False: every sample of row j was valid when it was appended.
     bool may_lack_samples(std::int64_t j) const;
     /// Samples [i, i + out.size()) of row j as they came: values, kVoidSample, kUncoveredSample.
-    Result<void> read_samples(std::int64_t i, std::int64_t j, std::span<double> out);
+    Result<void> read_samples(std::int64_t i, std::int64_t j, std::span<double> out) const;
     /// Replaces samples of row j, which must have a valid sample already. Summary is not changed by it.
     Result<void> write_samples(std::int64_t i, std::int64_t j, std::span<const double> values);
 
@@ -70,15 +74,16 @@ private:
     enum class RowState : std::uint8_t { all_valid, some_valid, none_valid };
 
     HeightSpool(int fd, std::string path, std::int64_t width, std::int64_t height, bool wide);
-    Result<const std::uint8_t*> row_bytes(std::int64_t j);
-    Result<void> load_support(std::int64_t j);
-    struct Rows {
-        std::int64_t first, end;
-    };
-    Rows rows_like(std::int64_t j) const;
-    std::int64_t supporting_row(const Rows& lacking) const;
-    Result<void> pread_samples(std::int64_t i, std::int64_t j, std::span<double> out,
-                               std::vector<std::uint8_t>& bytes) const;
+    template <class T>
+    void note_row(std::span<const T> row);
+    template <class T>
+    Result<void> append_rows(std::span<const T> rows);
+    /// The row whose values stand under row j where that has none.
+    std::int64_t supporting_row(std::int64_t j) const;
+    template <class T>
+    Result<void> read_stored(std::int64_t i, std::int64_t j, std::span<T> out) const;
+    template <class T>
+    Result<void> read_supported(std::int64_t j, std::span<T> values, std::span<std::uint8_t> valid) const;
 
     struct Descriptor {
         int fd;
@@ -90,11 +95,8 @@ private:
     std::int64_t row_bytes_;
     std::vector<RowState> rows_;  ///< of the rows appended so far
     Summary summary_;
-    std::vector<std::uint8_t> record_;  ///< samples on their way to or from the file
-    std::vector<std::uint8_t> chunk_;   ///< rows read ahead
-    std::int64_t chunk_first_ = 0, chunk_rows_ = 0;
-    std::vector<double> support_;  ///< what rows [support_first_, support_end_) repeat
-    std::int64_t support_first_ = 0, support_end_ = 0;
+    std::vector<std::int64_t> supporting_above_;  ///< of each row: the last one up to it with a valid sample, or -1
+    std::int64_t first_supporting_ = -1, last_supporting_ = -1;
 };
 
 }  // namespace scree

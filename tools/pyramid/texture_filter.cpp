@@ -1,47 +1,49 @@
 #include "tools/pyramid/texture_filter.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
-#include <cstring>
+
+#include "tools/pyramid/texture_filter_kernel.h"
 
 namespace scree {
 namespace {
 
 // Linear intensity in 0..65535 x 1/4: four texels sum below 2^18 / 4. 14 bits resolve the darkest sRGB step (1/3294)
 // five times over and keep the way back a table of 16 K entries.
-constexpr int kLinearBits = 14;
 constexpr std::uint32_t kLinearOne = (1u << kLinearBits) - 1;
 
-struct Tables {
-    std::array<std::uint16_t, 256> to_linear{};
-    std::array<std::uint8_t, 1u << kLinearBits> to_srgb{};
-
-    Tables() {
-        for (std::size_t v = 0; v < 256; ++v) {
-            const double s = static_cast<double>(v) / 255;
-            const double linear = s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4);
-            to_linear[v] = static_cast<std::uint16_t>(std::lround(linear * kLinearOne));
-        }
-        // The nearest sRGB value by linear distance: decided on integers, so no rounding of pow can reach the output.
-        std::size_t v = 0;
-        for (std::size_t linear = 0; linear <= kLinearOne; ++linear) {
-            while (v < 255 && 2 * linear >= static_cast<std::size_t>(to_linear[v]) + to_linear[v + 1]) ++v;
-            to_srgb[linear] = static_cast<std::uint8_t>(v);
-        }
+FilterTables made_tables() {
+    FilterTables t{};
+    for (std::size_t v = 0; v < 256; ++v) {
+        const double s = static_cast<double>(v) / 255;
+        const double linear = s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4);
+        t.to_linear[v] = static_cast<std::uint16_t>(std::lround(linear * kLinearOne));
+        t.linear_low[v] = static_cast<std::uint8_t>(t.to_linear[v]);
+        t.linear_high[v] = static_cast<std::uint8_t>(t.to_linear[v] >> 8);
     }
-};
-
-const Tables& tables() {
-    static const Tables instance;
-    return instance;
+    // The nearest sRGB value by linear distance: decided on integers, so no rounding of pow can reach the output.
+    std::size_t v = 0;
+    for (std::size_t linear = 0; linear <= kLinearOne; ++linear) {
+        while (v < 255 && 2 * linear >= static_cast<std::size_t>(t.to_linear[v]) + t.to_linear[v + 1]) ++v;
+        t.to_srgb[linear] = static_cast<std::uint8_t>(v);
+    }
+    return t;
 }
 
 }  // namespace
 
-void downsample_rgba_row(const std::uint8_t* upper, const std::uint8_t* lower, std::int64_t count, std::uint8_t* out) {
-    const Tables& t = tables();
+const FilterTables& filter_tables() {
+    static const FilterTables instance = made_tables();
+    return instance;
+}
+
+bool filter_row_avx512_runs_here() {
+    return __builtin_cpu_supports("avx512bw") != 0 && __builtin_cpu_supports("avx512vbmi") != 0;
+}
+
+void filter_row_scalar(const FilterTables& t, const std::uint8_t* upper, const std::uint8_t* lower, std::int64_t count,
+                       std::uint8_t* out) {
     for (std::int64_t k = 0; k < count; ++k) {
         const std::uint8_t* a = upper + 8 * k;
         const std::uint8_t* b = lower + 8 * k;
@@ -64,6 +66,11 @@ void downsample_rgba_row(const std::uint8_t* upper, const std::uint8_t* lower, s
         }
         o[3] = static_cast<std::uint8_t>((alpha + 2) >> 2);
     }
+}
+
+void downsample_rgba_row(const std::uint8_t* upper, const std::uint8_t* lower, std::int64_t count, std::uint8_t* out) {
+    static FilterRow* const filter = filter_row_avx512_runs_here() ? filter_row_avx512 : filter_row_scalar;
+    filter(filter_tables(), upper, lower, count, out);
 }
 
 }  // namespace scree

@@ -6,11 +6,12 @@
 #include <array>
 #include <cassert>
 #include <cstring>
-#include <vector>
+#include <tuple>
+#include <unordered_set>
 
 #include "common/store/texture_codec.h"
-#include "tools/pyramid/bc1_encoder.h"
 #include "tools/pyramid/texture_filter.h"
+#include "tools/stage_clock.h"
 
 namespace scree {
 namespace {
@@ -26,7 +27,7 @@ std::int64_t texels(std::int64_t cells, const Lattice& lattice, int size_log2, i
     return shift >= 0 ? (cells + (std::int64_t{1} << shift) - 1) >> shift : cells << -shift;
 }
 
-// One level of the pyramid, or (below level 0) a mip of the roots.
+// One level of the pyramid, or (above the root level) a mip of its tiles.
 struct Level {
     int id = 0;                  // may be negative
     std::int64_t width = 0;      // texels
@@ -43,11 +44,15 @@ struct Level {
 struct TexturePyramid::Impl {
     TexturePyramidJob job;
     std::int64_t size = 256;
-    std::vector<Level> levels;  // deepest first
-    TileSet deep_tiles;         // existence of tiles below the height pyramid's depth, by texture level
-    std::int64_t tiles_written = 0;
+    Extent extent;
+    std::vector<Level> levels;         // deepest first
+    std::vector<std::uint8_t> second;  // the other buffer of the deepest level's rows
+    int buffer = 0;                    // the one that stands in levels.front().rows
+    std::unordered_set<TileId, TileIdHash> tiles;
+    Seeds seeds;
 
     Level& level_of(int id) { return levels[static_cast<std::size_t>(job.deepest_level - id)]; }
+    bool makes_tiles(const Level& level) const { return level.id >= job.root_level; }
 
     void encode(Level& level) {
         const std::int64_t block_columns = level.width / 4;
@@ -55,11 +60,12 @@ struct TexturePyramid::Impl {
         const std::int64_t first_row = (level.rows_done % level.band_rows) / 4;
         const std::int64_t chunks = (block_columns + kChunkBlocks - 1) / kChunkBlocks;
         tbb::parallel_for(std::int64_t{0}, block_rows * chunks, [&](std::int64_t task) {
+            const StageClock::Scope clock(Stage::encode);
             const std::int64_t row = task / chunks, from = task % chunks * kChunkBlocks;
             const std::int64_t count = std::min(kChunkBlocks, block_columns - from);
             encode_bc1_row(level.rows.data() + (row * 4 * level.width + from * 4) * 4,
                            static_cast<std::size_t>(level.width * 4), static_cast<std::size_t>(count),
-                           level.blocks.data() + ((first_row + row) * block_columns + from) * 8);
+                           level.blocks.data() + ((first_row + row) * block_columns + from) * 8, job.quality);
         });
     }
 
@@ -67,6 +73,7 @@ struct TexturePyramid::Impl {
     void process(std::size_t index) {
         Level& level = levels[index];
         encode(level);
+        if (level.id == job.root_level) keep_seeds(level);
         level.rows_done += level.gathered;
         if (index + 1 < levels.size()) {
             Level& next = levels[index + 1];
@@ -74,6 +81,7 @@ struct TexturePyramid::Impl {
             const std::int64_t pairs = level.gathered / 2;
             std::uint8_t* out = next.rows.data() + next.gathered * next.width * 4;
             tbb::parallel_for(std::int64_t{0}, pairs, [&](std::int64_t p) {
+                const StageClock::Scope clock(Stage::filter);
                 const std::uint8_t* upper = level.rows.data() + 2 * p * level.width * 4;
                 downsample_rgba_row(upper, upper + level.width * 4, level.width / 2, out + p * next.width * 4);
                 std::memset(out + p * next.width * 4 + level.width / 2 * 4, 0,
@@ -84,36 +92,40 @@ struct TexturePyramid::Impl {
         }
     }
 
-    bool exists(TileId id) const {
-        if (id.level <= job.lattice.deepest_level) return job.height_tiles->contains(id);
-        return deep_tiles.contains(id);
+    void keep_seeds(const Level& level) {
+        seeds.columns = level.width;
+        seeds.rows += level.gathered;
+        seeds.rgba.insert(seeds.rgba.end(), level.rows.begin(),
+                          level.rows.begin() + static_cast<std::ptrdiff_t>(level.gathered * level.width * 4));
     }
+
     std::uint8_t child_mask(TileId id) const {
+        if (id.level == job.deepest_level) return job.children_below ? job.children_below(id) : std::uint8_t{0};
         std::uint8_t mask = 0;
-        if (id.level < job.deepest_level)
-            for (int q = 0; q < 4; ++q)
-                if (exists(child_of(id, q))) mask = static_cast<std::uint8_t>(mask | (1 << q));
+        for (int q = 0; q < 4; ++q)
+            if (tiles.count(child_of(id, q)) != 0) mask = static_cast<std::uint8_t>(mask | (1 << q));
         return mask;
     }
 
-    TextureTile assemble(TileId id) {
+    // `x`, `y`: within the rectangle.
+    TextureTile assemble(int level_id, std::int64_t x, std::int64_t y) {
         TextureTile tile;
         const int log2 = job.texture_size_log2;
         tile.blocks.resize(bc1_chain_bytes(log2));
         for (int mip = 0; log2 - mip >= 2; ++mip) {
-            const Level& level = level_of(id.level - mip);
+            const Level& level = level_of(level_id - mip);
             const std::int64_t side = size >> mip, blocks = side / 4;
-            const std::int64_t row0 = (id.y * side % level.band_rows) / 4, column0 = id.x * blocks;
+            const std::int64_t row0 = (y * side % level.band_rows) / 4, column0 = x * blocks;
             std::uint8_t* out = tile.blocks.data() + bc1_mip_offset(log2, mip);
             for (std::int64_t r = 0; r < blocks; ++r)
                 std::memcpy(out + r * blocks * 8, level.blocks.data() + ((row0 + r) * (level.width / 4) + column0) * 8,
                             static_cast<std::size_t>(blocks * 8));
         }
         // The last two mips: from the four gathered rows in which the 4 x 4 mip has just been completed.
-        const Level& level = level_of(id.level - (log2 - 2));
+        const Level& level = level_of(level_id - (log2 - 2));
         std::array<std::uint8_t, 16> two{};
         std::array<std::uint8_t, 4> one{};
-        const std::uint8_t* pixels = level.rows.data() + (level.gathered - 4) * level.width * 4 + id.x * 16;
+        const std::uint8_t* pixels = level.rows.data() + (level.gathered - 4) * level.width * 4 + x * 16;
         for (int r = 0; r < 2; ++r)
             downsample_rgba_row(pixels + 2 * r * level.width * 4, pixels + (2 * r + 1) * level.width * 4, 2,
                                 two.data() + 8 * r);
@@ -121,9 +133,9 @@ struct TexturePyramid::Impl {
         std::array<std::uint8_t, 64> repeated{};
         for (std::size_t t = 0; t < 16; ++t)
             std::memcpy(repeated.data() + 4 * t, two.data() + 4 * ((t / 4 % 2) * 2 + t % 2), 4);
-        encode_bc1_row(repeated.data(), 16, 1, tile.blocks.data() + bc1_mip_offset(log2, log2 - 1));
+        encode_bc1_row(repeated.data(), 16, 1, tile.blocks.data() + bc1_mip_offset(log2, log2 - 1), job.quality);
         for (std::size_t t = 0; t < 16; ++t) std::memcpy(repeated.data() + 4 * t, one.data(), 4);
-        encode_bc1_row(repeated.data(), 16, 1, tile.blocks.data() + bc1_mip_offset(log2, log2));
+        encode_bc1_row(repeated.data(), 16, 1, tile.blocks.data() + bc1_mip_offset(log2, log2), job.quality);
         return tile;
     }
 
@@ -141,121 +153,121 @@ struct TexturePyramid::Impl {
 
     // Every level whose band the last rows completed is turned into tiles, finest first: a tile's mips stand in the
     // coarser levels' blocks, which are reused only after their own band is complete.
-    Result<void> emit() {
-        for (std::size_t index = 0; index < levels.size() && levels[index].id >= 0; ++index) {
+    Result<void> emit(std::size_t from) {
+        for (std::size_t index = from; index < levels.size() && makes_tiles(levels[index]); ++index) {
             Level& level = levels[index];
             if (level.rows_done == 0 || level.rows_done % level.band_rows != 0 || level.gathered != level.capacity)
                 break;
-            const std::int64_t y = level.rows_done / level.band_rows - 1;
-            if (auto ok = emit_band(level, y); !ok) return ok;
+            if (auto ok = emit_band(level, level.rows_done / level.band_rows - 1); !ok) return ok;
         }
         return {};
     }
 
     Result<void> emit_band(Level& level, std::int64_t y) {
         const std::int64_t columns = level.width / size;
-        const bool deep = level.id > job.lattice.deepest_level;
+        const int down = level.id - job.root_level;
+        const TileId corner{level.id, job.first_column << down, (job.first_row << down) + y};
         std::vector<std::vector<std::uint8_t>> payloads(static_cast<std::size_t>(columns));
         tbb::parallel_for(std::int64_t{0}, columns, [&](std::int64_t x) {
-            const TileId id{level.id, x, y};
-            if (!deep && !exists(id)) return;
-            TextureTile tile = assemble(id);
-            if (deep && !any_opaque(tile, job.texture_size_log2) && !(job.deep != nullptr && job.deep->stored(id)))
-                return;
-            tile.child_mask = child_mask(id);
+            const TileId id{level.id, corner.x + x, corner.y};
+            const bool may_show = level.id > job.shared_levels, stored = job.stored(id);
+            const std::uint8_t children = child_mask(id);
+            if (!stored && !may_show) return;
+            const StageClock::Scope clock(Stage::encode);
+            TextureTile tile = assemble(level.id, x, y);
+            if (!stored && children == 0 && !any_opaque(tile, job.texture_size_log2)) return;
+            tile.child_mask = children;
             payloads[static_cast<std::size_t>(x)] =
                 encode_texture_tile(tile, job.texture_size_log2, TextureCodec::split);
         });
         for (std::int64_t x = 0; x < columns; ++x) {
-            const auto& payload = payloads[static_cast<std::size_t>(x)];
+            auto& payload = payloads[static_cast<std::size_t>(x)];
             if (payload.empty()) continue;
-            const TileId id{level.id, x, y};
-            if (deep) deep_tiles.insert(id);
-            ++tiles_written;
-            if (auto ok = job.writer->put(TileKind::texture, *tile_key(job.lattice, id),
-                                          static_cast<int>(TextureCodec::split), payload);
-                !ok)
-                return ok;
+            const TileId id{level.id, corner.x + x, corner.y};
+            tiles.insert(id);
+            if (auto ok = job.sink(id, std::move(payload)); !ok) return ok;
         }
         return {};
     }
 };
 
-TexturePyramid::TexturePyramid(const TexturePyramidJob& job) : impl_(std::make_unique<Impl>()) {
-    impl_->job = job;
-    impl_->size = std::int64_t{1} << job.texture_size_log2;
-    const std::int64_t size = impl_->size;
-    std::int64_t width =
-        round_up(texels(job.lattice.cells_x, job.lattice, job.texture_size_log2, job.deepest_level), size);
-    int capacity = static_cast<int>(std::min<std::int64_t>(kRowsPerPush, size));
-    const int coarsest = -(job.texture_size_log2 - 2);
-    for (int id = job.deepest_level; id >= coarsest; --id) {
+TexturePyramid::TexturePyramid(TexturePyramidJob job) : impl_(std::make_unique<Impl>()) {
+    Impl& m = *impl_;
+    m.size = std::int64_t{1} << job.texture_size_log2;
+    const int log2 = job.texture_size_log2, down = job.deepest_level - job.root_level;
+    const auto span = [&](std::int64_t cells, std::int64_t first, std::int64_t count) {
+        const std::int64_t all = padded_texels(cells, job.lattice, log2, job.deepest_level) >> log2;  // tiles
+        const std::int64_t begin = first << down;
+        const std::int64_t end = count > (all >> down) ? all : std::min(all, (first + count) << down);
+        return std::pair(begin << log2, std::max<std::int64_t>(0, end - begin) << log2);
+    };
+    std::tie(m.extent.first_column, m.extent.columns) = span(job.lattice.cells_x, job.first_column, job.columns);
+    std::tie(m.extent.first_row, m.extent.rows) = span(job.lattice.cells_y, job.first_row, job.rows);
+    std::int64_t width = m.extent.columns;
+    int capacity = static_cast<int>(std::min<std::int64_t>(kRowsPerPush, m.size));
+    for (int id = job.deepest_level; id >= job.root_level - (log2 - 2); --id) {
         Level level;
         level.id = id;
         level.width = width;
-        level.band_rows = id >= 0 ? size : size >> -id;
+        level.band_rows = id >= job.root_level ? m.size : m.size >> (job.root_level - id);
         level.capacity = capacity;
         level.rows.resize(static_cast<std::size_t>(capacity * width * 4));
         level.blocks.resize(static_cast<std::size_t>(level.band_rows / 4 * (width / 4) * 8));
-        impl_->levels.push_back(std::move(level));
-        width = id > 0 ? round_up(width / 2, size) : width / 2;
+        m.levels.push_back(std::move(level));
+        width = id > job.root_level ? round_up(width / 2, m.size) : width / 2;
         capacity = std::max(4, capacity / 2);
     }
-    if (job.deepest_level > job.lattice.deepest_level) {
-        Lattice deep = job.lattice;  // the same extent on a finer lattice: only counts of tiles are taken from it
-        const int extra = job.deepest_level - job.lattice.deepest_level;
-        deep.deepest_level += extra;
-        deep.cells_x <<= extra;
-        deep.cells_y <<= extra;
-        impl_->deep_tiles = TileSet(deep, job.deepest_level);
-    }
+    m.second.resize(m.levels.front().rows.size());
+    m.job = std::move(job);
 }
 
 TexturePyramid::~TexturePyramid() = default;
 
-std::int64_t TexturePyramid::width_of(const Lattice& lattice, int texture_size_log2, int deepest_level) {
-    return round_up(texels(lattice.cells_x, lattice, texture_size_log2, deepest_level),
-                    std::int64_t{1} << texture_size_log2);
-}
-std::int64_t TexturePyramid::width() const { return impl_->levels.front().width; }
-std::int64_t TexturePyramid::height() const {
-    const auto& job = impl_->job;
-    return round_up(texels(job.lattice.cells_y, job.lattice, job.texture_size_log2, job.deepest_level), impl_->size);
-}
+TexturePyramid::Extent TexturePyramid::extent() const { return impl_->extent; }
 int TexturePyramid::rows_per_push() const { return impl_->levels.front().capacity; }
-std::uint8_t* TexturePyramid::rows() { return impl_->levels.front().rows.data(); }
+std::uint8_t* TexturePyramid::rows(int buffer) {
+    return buffer == impl_->buffer ? impl_->levels.front().rows.data() : impl_->second.data();
+}
 
-Result<void> TexturePyramid::push() {
-    impl_->levels.front().gathered = impl_->levels.front().capacity;
+Result<void> TexturePyramid::push(int buffer) {
+    Level& front = impl_->levels.front();
+    if (buffer != impl_->buffer) {
+        std::swap(front.rows, impl_->second);
+        impl_->buffer = buffer;
+    }
+    front.gathered = front.capacity;
     impl_->process(0);
-    return impl_->emit();
+    return impl_->emit(0);
 }
 
 Result<std::int64_t> TexturePyramid::finish() {
     // Levels whose band is incomplete are filled up with transparent rows, finest first.
     for (std::size_t index = 1; index < impl_->levels.size(); ++index) {
         Level& level = impl_->levels[index];
-        const std::int64_t complete = level.id >= 0 ? impl_->size : level.band_rows;
-        while ((level.rows_done + (level.gathered == level.capacity ? 0 : level.gathered)) % complete != 0) {
+        while ((level.rows_done + (level.gathered == level.capacity ? 0 : level.gathered)) % level.band_rows != 0) {
             if (level.gathered == level.capacity) level.gathered = 0;
             std::memset(level.rows.data() + level.gathered * level.width * 4, 0,
                         static_cast<std::size_t>((level.capacity - level.gathered) * level.width * 4));
             level.gathered = level.capacity;
             impl_->process(index);
-            for (std::size_t done = index; done < impl_->levels.size() && impl_->levels[done].id >= 0; ++done) {
-                Level& l = impl_->levels[done];
-                if (l.rows_done % l.band_rows != 0 || l.gathered != l.capacity) break;
-                if (auto ok = impl_->emit_band(l, l.rows_done / l.band_rows - 1); !ok) return ok.error();
-            }
+            if (auto ok = impl_->emit(index); !ok) return ok.error();
         }
     }
-    return impl_->tiles_written;
+    return static_cast<std::int64_t>(impl_->tiles.size());
 }
 
-std::int64_t TexturePyramid::bytes_needed(const Lattice& lattice, int texture_size_log2, int deepest_level) {
+const TexturePyramid::Seeds& TexturePyramid::seeds() const { return impl_->seeds; }
+bool TexturePyramid::stored(TileId id) const { return impl_->tiles.count(id) != 0; }
+
+std::int64_t TexturePyramid::padded_texels(std::int64_t cells, const Lattice& lattice, int texture_size_log2,
+                                           int level) {
+    return round_up(texels(cells, lattice, texture_size_log2, level), std::int64_t{1} << texture_size_log2);
+}
+
+std::int64_t TexturePyramid::bytes_needed(std::int64_t texels_wide, int texture_size_log2) {
     const std::int64_t size = std::int64_t{1} << texture_size_log2;
-    const std::int64_t width = round_up(texels(lattice.cells_x, lattice, texture_size_log2, deepest_level), size);
-    const std::int64_t rows = 2 * kRowsPerPush * width * 4;
+    const std::int64_t width = round_up(texels_wide, size);
+    const std::int64_t rows = 3 * kRowsPerPush * width * 4;
     const std::int64_t blocks = 2 * size / 2 * width;            // half a byte a texel, all levels
     const std::int64_t payloads = size / 2 * width * 4 / 3 * 2;  // a band of tiles, assembled and packed
     return rows + blocks + payloads + (std::int64_t{4} << 20);

@@ -1,47 +1,71 @@
-// Turns rows of RGBA texels, north to south, into the texture pyramid in one pass. Every 4 x 4 block is encoded once:
-// tiles have no gutter and the filter is a 2 x 2 box, so mip k of a tile is the block-aligned part of its ancestor k
-// levels up, and is taken from there. Memory: BC1 blocks of one band of tiles a level and a few rows of texels.
+// Turns rows of RGBA texels, north to south, into a texture pyramid in one pass: the tiles of levels root_level ..
+// deepest_level under a rectangle of tiles of root_level. Every 4 x 4 block is encoded once: tiles have no gutter and
+// the filter is a 2 x 2 box, so mip k of a tile is the block-aligned part of its ancestor k levels up, and is taken
+// from there. Nothing outside the rectangle has a say in it (docs/resume-and-update.md, "Pieces"). Memory: BC1 blocks
+// of one band of tiles a level and a few rows of texels.
 #pragma once
 
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <vector>
 
 #include "common/dataset.h"
-#include "common/store/sqlite_store.h"
-#include "tools/pyramid/deep_branch.h"
-#include "tools/pyramid/tile_set.h"
+#include "tools/pyramid/bc1_encoder.h"
 
 namespace scree {
 
+/// Takes finished rows; called by one thread at a time.
+using TextureSink = std::function<Result<void>(TileId id, std::vector<std::uint8_t> payload)>;
+
 struct TexturePyramidJob {
-    SqliteStoreWriter* writer = nullptr;
-    Lattice lattice;
+    Lattice lattice;  ///< of the dense part
     int texture_size_log2 = 8;
     int deepest_level = 0;
-    const TileSet* height_tiles = nullptr;  ///< decides which tiles of shared levels exist
-    const DeepPresence* deep = nullptr;     ///< the same for deeper ones, besides what is opaque
+    int root_level = 0;
+    TextureQuality quality = TextureQuality::normal;
+    /// The rectangle, in tiles of root_level; cut to the data's extent.
+    std::int64_t first_column = 0, first_row = 0, columns = kMaxCellsPerSide, rows = kMaxCellsPerSide;
+    /// Tiles that are stored whatever they show, by address. Any thread.
+    std::function<bool(TileId id)> stored;
+    /// Deeper than this level (the deepest of the dense heights) a tile is stored also where it shows anything.
+    int shared_levels = 0;
+    /// Which children of a tile of deepest_level are stored: 0 where that is the texture's depth. Any thread.
+    std::function<std::uint8_t(TileId id)> children_below;
+    TextureSink sink;
 };
 
 class TexturePyramid {
 public:
-    explicit TexturePyramid(const TexturePyramidJob& job);
+    explicit TexturePyramid(TexturePyramidJob job);
     ~TexturePyramid();
 
-    /// Texels a row: the data's extent padded to whole tiles.
-    static std::int64_t width_of(const Lattice& lattice, int texture_size_log2, int deepest_level);
-    std::int64_t width() const;
-    /// Rows to push: the data's extent padded to whole tiles.
-    std::int64_t height() const;
+    /// The rectangle in texels of the deepest level, padded to whole tiles.
+    struct Extent {
+        std::int64_t first_column = 0, first_row = 0, columns = 0, rows = 0;
+    };
+    Extent extent() const;
     /// Rows a push takes; divides the tile size.
     int rows_per_push() const;
-    /// The buffer for the next rows_per_push() rows, width() * 4 bytes each. Fill it, then push().
-    std::uint8_t* rows();
-    Result<void> push();
+    /// Two buffers for rows_per_push() rows of extent().columns * 4 bytes. Fill one while the other is pushed.
+    std::uint8_t* rows(int buffer);
+    Result<void> push(int buffer);
     /// After all rows: completes the coarse levels.
-    Result<std::int64_t> finish();  ///< tiles written
+    Result<std::int64_t> finish();  ///< tiles stored
 
-    static std::int64_t bytes_needed(const Lattice& lattice, int texture_size_log2, int deepest_level);
+    /// After finish(): the pixels of level root_level, in whole tiles, row-major.
+    struct Seeds {
+        std::int64_t columns = 0, rows = 0;  ///< pixels
+        std::vector<std::uint8_t> rgba;
+    };
+    const Seeds& seeds() const;
+    /// Was this tile of the rectangle stored?
+    bool stored(TileId id) const;
+
+    /// Bytes held for a rectangle so many texels wide.
+    static std::int64_t bytes_needed(std::int64_t texels_wide, int texture_size_log2);
+    /// Texels of level `level` over the data's extent, padded to whole tiles.
+    static std::int64_t padded_texels(std::int64_t cells, const Lattice& lattice, int texture_size_log2, int level);
 
 private:
     struct Impl;

@@ -76,24 +76,28 @@ public:
     int base_level() const { return base_level_; }
     int levels() const { return lattice_.deepest_level + 1 - base_level_; }
 
+    /// The leaf over the finest tile asked for last: neighbouring samples ask for the same one.
+    struct RecentLeaf {
+        std::int64_t tile_x = -1, tile_y = -1;
+        int level = 0;
+    };
+
     /// The cells at a place: several where it is on a line between them.
-    SurfacePlaces places_at(double i, double j) const {
+    SurfacePlaces places_at(double i, double j, RecentLeaf& recent) const {
         SurfacePlaces places;
-        for (const double sj : {kOnLine, -kOnLine})
-            for (const double si : {kOnLine, -kOnLine}) {
-                const double at_i = i + si, at_j = j + sj;
-                if (!(at_i >= 0 && at_j >= 0 && at_i < static_cast<double>(lattice_.cells_x) &&
-                      at_j < static_cast<double>(lattice_.cells_y)))
-                    continue;
-                const auto fi = static_cast<std::int64_t>(at_i), fj = static_cast<std::int64_t>(at_j);
-                const int level = leaf_level(fi, fj), shift = lattice_.deepest_level - level;
+        const FinestCells columns(i, lattice_.cells_x), rows(j, lattice_.cells_y);
+        for (std::size_t r = 0; r < rows.count; ++r)
+            for (std::size_t c = 0; c < columns.count; ++c) {
+                const std::int64_t fi = columns.cell[c], fj = rows.cell[r];
+                const int level = leaf_level(fi, fj, recent), shift = lattice_.deepest_level - level;
                 SurfacePlace p{level, fi >> shift, fj >> shift, 0, 0};
                 const auto known = std::find_if(places.begin(), places.end(), [&](const SurfacePlace& q) {
                     return q.level == p.level && q.ci == p.ci && q.cj == p.cj;
                 });
                 if (known != places.end()) continue;
-                p.u = std::clamp(std::ldexp(i, -shift) - static_cast<double>(p.ci), 0.0, 1.0);
-                p.v = std::clamp(std::ldexp(j, -shift) - static_cast<double>(p.cj), 0.0, 1.0);
+                const double step = 1 / static_cast<double>(std::int64_t{1} << shift);  // exact
+                p.u = std::clamp(i * step - static_cast<double>(p.ci), 0.0, 1.0);
+                p.v = std::clamp(j * step - static_cast<double>(p.cj), 0.0, 1.0);
                 places.all[places.count++] = p;
             }
         return places;
@@ -123,11 +127,26 @@ public:
     }
 
 private:
-    int leaf_level(std::int64_t fi, std::int64_t fj) const {
+    // The finest cells of a row or column that a coordinate lies in: two where it is on the line between them.
+    struct FinestCells {
+        FinestCells(double at, std::int64_t cells) {
+            for (const double side : {kOnLine, -kOnLine}) {
+                if (!(at + side >= 0 && at + side < static_cast<double>(cells))) continue;
+                const auto found = static_cast<std::int64_t>(at + side);
+                if (count == 0 || found != cell[0]) cell[count++] = found;
+            }
+        }
+        std::array<std::int64_t, 2> cell{};
+        std::size_t count = 0;
+    };
+
+    int leaf_level(std::int64_t fi, std::int64_t fj, RecentLeaf& recent) const {
         if (job_.tree == nullptr) return base_level_;
         const TileId finest{lattice_.deepest_level, fi >> lattice_.tile_cells_log2, fj >> lattice_.tile_cells_log2};
+        if (finest.x == recent.tile_x && finest.y == recent.tile_y) return recent.level;
         int level = base_level_;
         while (job_.tree->refined(ancestor_at(finest, level))) ++level;
+        recent = {finest.x, finest.y, level};
         return level;
     }
 
@@ -234,13 +253,14 @@ private:
         if (!window) return window.error();
         const Lattice& l = job_.plan.lattice;
         std::vector<Truth> truths;
+        FinestSurface::RecentLeaf recent;
         std::size_t k = 0;
         for (std::int64_t r = 0; r < area.rows; ++r)
             for (std::int64_t c = 0; c < area.columns; ++c, ++k) {
                 if (!std::isfinite(values[k])) continue;
                 const PlanePoint at =
                     window->position(static_cast<double>(area.column + c), static_cast<double>(area.row + r));
-                auto places = surface_.places_at(l.i_of(at.x), l.j_of(at.y));
+                auto places = surface_.places_at(l.i_of(at.x), l.j_of(at.y), recent);
                 if (places.count == 0) continue;
                 truths.push_back({places, job_.raw_values ? job_.quantizer.metres(values[k]) : values[k]});
             }

@@ -135,6 +135,12 @@ Result<ColourRows> ColourRows::make(const std::string& path, const ImageInfo& in
     return rows;
 }
 
+bool ColourRows::opaque() const {
+    if (alpha_channel_ >= 0 || !nodata_.empty() || index_nodata_) return false;
+    // Palettes have alpha of their own, and indices beyond their end are nothing.
+    return model_ == ColourModel::cmyk || (model_ == ColourModel::grey_or_rgb && is_integer(type_));
+}
+
 void ColourRows::fill_tables() {
     const SampleType type = model_ == ColourModel::grey_or_rgb ? type_ : SampleType::u8;
     identity_ = type == SampleType::u8 && low_ == 0 && high_ == 255;

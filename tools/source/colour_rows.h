@@ -34,6 +34,8 @@ public:
     int shown_bands() const { return grey_ ? 1 : 3; }
     /// The shown samples have at most 8 bits as they are stored.
     bool eight_bit() const { return eight_bit_; }
+    /// Without a mask every pixel comes out with alpha 255.
+    bool opaque() const;
 
     /// `samples`: a row, all channels, as decoded. `out`: 4 bytes a pixel.
     void to_rgba8(const std::byte* samples, const MaskRow& mask, std::uint8_t* out) const;

@@ -27,4 +27,6 @@ std::string fingerprint_of(const std::string& path) {
     return fmt::format("{:016x}", XXH3_64bits_withSeed(bytes.data(), bytes.size(), static_cast<std::uint64_t>(size)));
 }
 
+std::uint64_t fingerprint_of_bytes(std::string_view bytes) { return XXH3_64bits(bytes.data(), bytes.size()); }
+
 }  // namespace scree

@@ -41,10 +41,27 @@ VoidRule::VoidRule(const ImageInfo& dem, const HeightReading& reading) : tag_(de
     if (user_ && dem.type == SampleType::f32) user_ = static_cast<double>(static_cast<float>(*user_));
 }
 
-void VoidRule::apply(std::span<double> values) const {
-    for (double& v : values)
-        if (!std::isfinite(v) || (tag_ && v == *tag_) || (user_ && v == *user_))
-            v = std::numeric_limits<double>::quiet_NaN();
+namespace {
+
+// No branches, so that vectors can take it. A value that a sample type cannot hold is none of its values.
+template <class T>
+void apply_rule(std::span<T> values, const std::optional<double>& tag, const std::optional<double>& user) {
+    constexpr T kVoid = std::numeric_limits<T>::quiet_NaN(), kGreatest = std::numeric_limits<T>::max();
+    const auto as_sample = [](const std::optional<double>& value) {
+        if (!value || !(std::abs(*value) <= static_cast<double>(kGreatest))) return kVoid;  // equals nothing
+        const T sample = static_cast<T>(*value);
+        return static_cast<double>(sample) == *value ? sample : kVoid;
+    };
+    const T of_tag = as_sample(tag), of_user = as_sample(user);
+    for (T& v : values) {
+        const bool height = (v >= -kGreatest) & (v <= kGreatest) & !(v == of_tag) & !(v == of_user);
+        v = height ? v : kVoid;
+    }
 }
+
+}  // namespace
+
+void VoidRule::apply(std::span<double> values) const { apply_rule(values, tag_, user_); }
+void VoidRule::apply(std::span<float> values) const { apply_rule(values, tag_, user_); }
 
 }  // namespace scree

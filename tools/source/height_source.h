@@ -39,6 +39,8 @@ class VoidRule {
 public:
     VoidRule(const ImageInfo& dem, const HeightReading& reading);
     void apply(std::span<double> values) const;
+    /// Of a type that fits float32.
+    void apply(std::span<float> values) const;
 
 private:
     std::optional<double> tag_, user_;

@@ -143,6 +143,7 @@ public:
         colours_.emplace(std::move(*colours));
         info_.eight_bit = colours_->eight_bit();
         info_.shown_bands = colours_->shown_bands();
+        info_.opaque = colours_->opaque();
         return {};
     }
 
@@ -152,6 +153,7 @@ public:
             (layout.channels != 1 && layout.channels != info_.channels))
             return unusable(path_, "its mask is not of the image's size, so what is valid is unknown");
         mask_.emplace(std::move(decoder));
+        info_.opaque = false;
         return mask_->prepare(path_, header.rows_per_strip, options.max_unit_bytes);
     }
 

@@ -34,6 +34,7 @@ struct ImageInfo {
     std::int64_t unit_rows = 1;       ///< rows decoded together: a band that starts at a multiple of it costs least
     bool values_are_colours = false;  ///< palette, CMYK, YCbCr, Lab: read_channel refuses
     bool eight_bit = true;            ///< what is shown has 8 bits or fewer as it is stored
+    bool opaque = false;              ///< read_rgba8 gives alpha 255 everywhere: no alpha, mask, nodata nor NaN
     int shown_bands = 1;              ///< 1 (grey) or 3: what read_shown gives a pixel
     /// What samples stand for: value * value_scale + value_offset, in Georeference::height_unit_m where that is said
     /// (GDAL's SCALE and OFFSET). read_channel and nodata are of the samples as they are stored.

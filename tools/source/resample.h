@@ -45,5 +45,13 @@ void resample_heights(const SampleWindow<double>& window, const SourcePoints& po
 /// Alpha of the result is the weighted mean of alpha over samples of the raster, at least 1, and 0 for void.
 void resample_colours(const SampleWindow<std::uint32_t>& window, const SourcePoints& points, const ResampleRule& rule,
                       std::span<std::uint32_t> out);
+/// Points at the crossings of columns and rows: those of row 0 first. Gives what the points one by one would, sooner.
+struct SourceLines {
+    std::span<const double> column, row;
+};
+void resample_colour_lines(const SampleWindow<std::uint32_t>& window, const SourceLines& lines,
+                           const ResampleRule& rule, std::span<std::uint32_t> out);
+/// The sample that Kernel::nearest takes along an axis; -1: the point lies outside.
+std::int64_t nearest_sample(double u, std::int64_t size, bool half_sample_rim);
 
 }  // namespace scree

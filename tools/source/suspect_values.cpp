@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "tools/source/value_range.h"
+
 namespace scree {
 namespace {
 
@@ -93,10 +95,22 @@ void SuspectValues::look_at(double v) {
     for (Suspect& s : suspects_) s.has_neighbours |= std::abs(v - s.value) <= kNeighbourhood;
 }
 
-void SuspectValues::add(std::span<const double> values) {
-    for (const double v : values)
-        if (v <= ordinary_above_ || v >= ordinary_below_) look_at(v);
+// Most values matter to nobody: whole groups are passed over by their range.
+template <class T>
+void SuspectValues::add_all(std::span<const T> values) {
+    constexpr std::size_t kGroup = 1024;
+    if (suspects_.empty()) return;
+    for (std::size_t first = 0; first < values.size(); first += kGroup) {
+        const auto group = values.subspan(first, std::min(kGroup, values.size() - first));
+        const ValueRange<T> range = range_of_values(group);
+        if (range.low > ordinary_above_ && range.high < ordinary_below_) continue;
+        for (const T v : group)
+            if (v <= ordinary_above_ || v >= ordinary_below_) look_at(v);
+    }
 }
+
+void SuspectValues::add(std::span<const double> values) { add_all(values); }
+void SuspectValues::add(std::span<const float> values) { add_all(values); }
 
 std::optional<std::string> SuspectValues::warning(const std::string& path) const {
     const Suspect* accused = nullptr;

@@ -22,6 +22,7 @@ public:
 
     /// Raw values as the file has them, before VoidRule; any number of rows in any order.
     void add(std::span<const double> values);
+    void add(std::span<const float> values);
 
     /// One sentence for the user, or none when nothing is accused. Of several accused values: the one that most samples
     /// have, the first of equals in the order of values.
@@ -35,6 +36,8 @@ private:
     };
     bool is_declared(double v) const;
     void look_at(double v);
+    template <class T>
+    void add_all(std::span<const T> values);
 
     std::optional<double> tag_, user_;
     std::vector<Suspect> suspects_;           ///< ascending

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <sqlite3.h>
 
+#include <algorithm>
 #include <array>
 #include <memory>
 #include <optional>
@@ -14,8 +15,11 @@
 namespace scree {
 namespace {
 
-constexpr std::array<std::string_view, 3> kTables{"height", "texture", "dataset"};
+// Stores made before there were seeds lack the last.
+constexpr std::array<std::string_view, 4> kTables{"height", "texture", "dataset", "seed"};
+constexpr std::size_t kRequiredTables = 3;
 constexpr int kPageBytes = 16384;
+constexpr int kSeedLevelsUp = 4;  // 256 finest pixels to one of a seed
 constexpr int kRowsBetweenAsking = 1024;
 
 using Database = std::unique_ptr<sqlite3, decltype(&sqlite3_close_v2)>;
@@ -29,6 +33,7 @@ public:
         const int rc = sqlite3_open_v2(path.c_str(), &raw, SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX, nullptr);
         Connection connection(path, Database(raw, sqlite3_close_v2));
         if (rc != SQLITE_OK) return connection.error(rc);
+        sqlite3_busy_timeout(raw, 60000);  // somebody may be committing an update
         sqlite3_db_config(raw, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
         sqlite3_db_config(raw, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
         return connection;
@@ -81,9 +86,8 @@ Result<bool> sound(const Result<void>& result, ProblemList& problems) {
     return false;
 }
 
-Result<bool> check_schema(Connection& db, ProblemList& problems) {
+Result<bool> check_schema(Connection& db, std::vector<std::string>& found, ProblemList& problems) {
     bool usable = true;
-    std::vector<std::string> found;
     auto listed = sound(db.query("SELECT type, name FROM sqlite_master ORDER BY name",
                                  [&](sqlite3_stmt* row) {
                                      const std::string type = text_of(row, 0), name = text_of(row, 1);
@@ -99,11 +103,15 @@ Result<bool> check_schema(Connection& db, ProblemList& problems) {
                                  }),
                         problems);
     if (!listed || !*listed) return listed;
-    if (found.size() != kTables.size()) {
-        problems.add(fmt::format("schema: {} of the 3 tables of a store", found.size()));
+    const auto required = kTables.begin() + kRequiredTables;
+    const auto there = std::count_if(kTables.begin(), required, [&](std::string_view table) {
+        return std::find(found.begin(), found.end(), table) != found.end();
+    });
+    if (static_cast<std::size_t>(there) != kRequiredTables) {
+        problems.add(fmt::format("schema: {} of the {} tables of a store", there, kRequiredTables));
         return false;
     }
-    for (const auto table : kTables) {
+    for (const auto& table : found) {
         std::string columns;
         auto read =
             sound(db.query(fmt::format("SELECT name, type, \"notnull\", pk FROM pragma_table_info('{}')", table),
@@ -122,8 +130,8 @@ Result<bool> check_schema(Connection& db, ProblemList& problems) {
     return usable;
 }
 
-Result<void> check_column_types(Connection& db, ProblemList& problems) {
-    for (const auto table : kTables) {
+Result<void> check_column_types(Connection& db, const std::vector<std::string>& tables, ProblemList& problems) {
+    for (const auto& table : tables) {
         auto wrong =
             db.integer(fmt::format("SELECT count(*) FROM {} WHERE typeof(codec) <> 'integer' OR "
                                    "typeof(checksum) <> 'integer' OR typeof(payload) <> 'blob'",
@@ -165,7 +173,8 @@ Result<bool> check_layout(const std::string& path, ProblemList& problems) {
     if (*page_size != kPageBytes) problems.add(fmt::format("pages of {} bytes instead of {}", *page_size, kPageBytes));
     if (pages >= 0 && pages != *page_count)
         problems.add(fmt::format("the file holds {} pages, its header says {}", pages, *page_count));
-    auto usable = check_schema(*db, problems);
+    std::vector<std::string> tables;
+    auto usable = check_schema(*db, tables, problems);
     if (!usable || !*usable) return usable;
 
     bool walkable = true;
@@ -181,10 +190,41 @@ Result<bool> check_layout(const std::string& path, ProblemList& problems) {
     if (!ran) return ran;
     // Full scans of a tree whose pages are entangled could take for ever; row by row (check_keys) they cannot.
     if (!*ran || !walkable) return true;
-    auto types = sound(check_column_types(*db, problems), problems);
+    auto types = sound(check_column_types(*db, tables, problems), problems);
     if (!types) return types;
     return true;
 }
+
+namespace {
+
+// No tile leads to a seed, so that each is met here.
+Result<void> check_seeds(const SqliteStore& store, ProblemList& problems, const std::function<bool()>& go_on) {
+    const Dataset& dataset = store.dataset();
+    const int seed_level = dataset.texture_deepest_level - kSeedLevelsUp;
+    std::optional<std::int64_t> previous;
+    std::int64_t count = 0;
+    auto ok = store.for_each(TileKind::seed, [&](const SqliteStore::RowView& row) {
+        if (previous && row.key <= *previous) {
+            problems.add(fmt::format("table 'seed': key {} follows key {}", row.key, *previous));
+            return false;  // the tree of pages may have a cycle
+        }
+        previous = row.key;
+        const auto id = tile_from_key(dataset.lattice, row.key);
+        if (!id)
+            problems.add(fmt::format("table 'seed': {} is no key of this lattice", row.key));
+        else if (id->level != seed_level)
+            problems.add(fmt::format("seed {}/{}/{} is not of the seed level {}", id->level, id->x, id->y, seed_level));
+        else if (!row.checksum_ok)
+            problems.add(
+                fmt::format("seed {}/{}/{}: checksum does not match: the row is damaged", id->level, id->x, id->y));
+        return ++count % kRowsBetweenAsking != 0 || go_on();
+    });
+    auto read = sound(ok, problems);
+    if (!read) return read.error();
+    return {};
+}
+
+}  // namespace
 
 Result<RowCounts> check_keys(const SqliteStore& store, ProblemList& problems, const std::function<bool()>& go_on) {
     auto db = Connection::open(store.path());
@@ -218,6 +258,8 @@ Result<RowCounts> check_keys(const SqliteStore& store, ProblemList& problems, co
     if (auto ok = scan("height", dataset.lattice.deepest_level, counts.height); !ok) return ok.error();
     if (!stopped)
         if (auto ok = scan("texture", dataset.texture_deepest_level, counts.texture); !ok) return ok.error();
+    if (!stopped)
+        if (auto ok = check_seeds(store, problems, [&] { return !(stopped = !go_on()); }); !ok) return ok.error();
     if (stopped) return Error{ErrorCode::interrupted, store.path() + ": stopped"};
     return counts;
 }

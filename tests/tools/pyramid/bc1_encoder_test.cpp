@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/common/test_support.h"
 #include "tools/pyramid/bc1_kernel.h"
 
 #pragma GCC diagnostic push
@@ -258,11 +259,14 @@ struct NamedKernel {
     bool runs_here = false;
 };
 
-std::vector<NamedKernel> kernels() {
-    return {{"Sse2", bc1_kernel_sse2, true},
-            {"Avx2", bc1_kernel_avx2, __builtin_cpu_supports("avx2") != 0},
-            {"Avx512", bc1_kernel_avx512, __builtin_cpu_supports("avx512bw") != 0}};
+std::vector<NamedKernel> kernels(TextureQuality quality) {
+    const bool high = quality == TextureQuality::high;
+    return {{"Sse2", high ? bc1_high_kernel_sse2 : bc1_kernel_sse2, true},
+            {"Avx2", high ? bc1_high_kernel_avx2 : bc1_kernel_avx2, __builtin_cpu_supports("avx2") != 0},
+            {"Avx512", high ? bc1_high_kernel_avx512 : bc1_kernel_avx512, bc1_kernel_avx512_runs_here()}};
 }
+
+constexpr TextureQuality kQualities[] = {TextureQuality::normal, TextureQuality::high};
 
 /// Blocks of every character side by side: noise, few levels, solid, two colours, with and without transparent texels.
 Image random_blocks(unsigned seed, bool with_alpha) {
@@ -299,6 +303,29 @@ Image random_blocks(unsigned seed, bool with_alpha) {
                 }
                 const std::array<int, 4> alphas{below(random, 256), other ? 127 : 128, 0, 255};
                 texel[3] = static_cast<std::uint8_t>(alphas[static_cast<std::size_t>(alpha_kind)]);
+            }
+        }
+    }
+    return image;
+}
+
+/// Areas of one colour and transparent ones, in runs of many lengths, with noise and rims between.
+Image flat_areas(unsigned seed) {
+    Random random(seed);
+    Image image(4 * 259, 4 * 12);
+    for (std::size_t by = 0; by < image.height / 4; ++by) {
+        for (std::size_t bx = 0; bx < image.width / 4;) {
+            const int kind = below(random, 5);
+            const std::size_t end = std::min(image.width / 4, bx + 1 + random() % 60);
+            const std::array<int, 3> colour{below(random, 256), below(random, 256), below(random, 256)};
+            for (; bx < end; ++bx) {
+                for (std::size_t i = 0; i < 16; ++i) {
+                    std::uint8_t* texel = image.texel(bx * 4 + i % 4, by * 4 + i / 4);
+                    for (std::size_t c = 0; c < 3; ++c) {
+                        texel[c] = static_cast<std::uint8_t>(kind == 0 ? below(random, 256) : colour[c]);
+                    }
+                    texel[3] = static_cast<std::uint8_t>(kind == 1 ? 0 : kind == 2 ? below(random, 2) * 255 : 255);
+                }
             }
         }
     }
@@ -419,6 +446,42 @@ TEST(Bc1Encoder, OpaqueTexelsOfATransparentBlockKeepTheirColours) {
     }
 }
 
+/// PSNR over the opaque texels.
+double opaque_psnr_db(const Image& image, const std::vector<std::uint8_t>& blocks) {
+    const std::size_t across = image.width / 4;
+    double error = 0;
+    double samples = 0;
+    for (std::size_t i = 0; i < blocks.size() / 8; ++i) {
+        const std::array<Texel, 16> texels = decoded(&blocks[i * 8]);
+        for (std::size_t k = 0; k < 16; ++k) {
+            const std::uint8_t* source = image.texel(i % across * 4 + k % 4, i / across * 4 + k / 4);
+            for (std::size_t c = 0; c < 3 && source[3] >= 128; ++c) {
+                const double off = source[c] - texels[k][c];
+                error += off * off;
+                ++samples;
+            }
+        }
+    }
+    return 10 * std::log10(255.0 * 255.0 * samples / error);
+}
+
+TEST(Bc1Encoder, RimsAreNotWorseThanStbMakesThem) {
+    // Every block has transparent texels, black as the pyramid's filter leaves them: stb_dxt fits its four colours to
+    // them too, and shows the opaque ones with what is left.
+    for (const Scene& scene : scenes()) {
+        Image image = scene.paint();
+        for (std::size_t y = 0; y < image.height; ++y) {
+            for (std::size_t x = 0; x < image.width; ++x) {
+                if ((x + y / 8) % 4 == 0) {
+                    std::memset(image.texel(x, y), 0, 4);
+                }
+            }
+        }
+        EXPECT_GE(opaque_psnr_db(image, encoded(image)), opaque_psnr_db(image, encoded_by_stb(image)) + 0.5)
+            << scene.name;
+    }
+}
+
 TEST(Bc1Encoder, AnAllTransparentBlockHasOneEncoding) {
     Random random(15);
     const std::vector<std::uint8_t> wanted{0, 0, 0, 0, 0xFF, 0xFF, 0xFF, 0xFF};
@@ -483,29 +546,96 @@ TEST(Bc1Encoder, ReadsNoByteBeyondTheBlocks) {
 }
 
 TEST(Bc1Kernel, AllInstructionSetsGiveIdenticalBytes) {
-    std::vector<Image> images{random_blocks(20, false), random_blocks(21, true), random_blocks(22, true)};
+    SCREE_TRACE_SEED();
+    const auto seed = static_cast<unsigned>(test::seed());
+    std::vector<Image> images{random_blocks(seed, false), random_blocks(seed + 1, true), random_blocks(seed + 2, true),
+                              flat_areas(seed + 3)};
     for (const Scene& scene : scenes()) {
         images.push_back(scene.paint());
     }
-    for (const NamedKernel& kernel : kernels()) {
-        if (!kernel.runs_here) {
-            continue;
-        }
-        for (std::size_t i = 0; i < images.size(); ++i) {
-            EXPECT_EQ(encoded(images[i], kernel.kernel), encoded(images[i], bc1_kernel_sse2))
-                << kernel.name << ' ' << i;
+    for (const TextureQuality quality : kQualities) {
+        const std::vector<NamedKernel> all = kernels(quality);
+        for (const NamedKernel& kernel : all) {
+            if (!kernel.runs_here) {
+                continue;
+            }
+            for (std::size_t i = 0; i < images.size(); ++i) {
+                EXPECT_EQ(encoded(images[i], kernel.kernel), encoded(images[i], all[0].kernel))
+                    << kernel.name << ' ' << i;
+            }
         }
     }
 }
 
 TEST(Bc1Kernel, TheBestOneIsTheWidestThatRunsHere) {
-    Bc1Kernel* widest = nullptr;
-    for (const NamedKernel& kernel : kernels()) {
-        if (kernel.runs_here) {
-            widest = kernel.kernel;
+    for (const TextureQuality quality : kQualities) {
+        Bc1Kernel* widest = nullptr;
+        for (const NamedKernel& kernel : kernels(quality)) {
+            if (kernel.runs_here) {
+                widest = kernel.kernel;
+            }
+        }
+        EXPECT_EQ(best_bc1_kernel(quality), widest);
+    }
+}
+
+TEST(Bc1Kernel, ABlockHasTheSameBytesWhereverItStands) {
+    // Flat groups, mixed blocks and the rest of a row each take a way of their own.
+    SCREE_TRACE_SEED();
+    for (const TextureQuality quality : kQualities) {
+        for (const Image& image : {flat_areas(static_cast<unsigned>(test::seed())), random_blocks(23, true)}) {
+            for (const NamedKernel& kernel : kernels(quality)) {
+                if (!kernel.runs_here) {
+                    continue;
+                }
+                const std::vector<std::uint8_t> all = encoded(image, kernel.kernel);
+                const std::size_t across = image.width / 4;
+                for (std::size_t i = 0; i < all.size() / 8; i += 3) {
+                    std::array<std::uint8_t, 8> alone{};
+                    encode_bc1_row_with(kernel.kernel, image.texel(i % across * 4, i / across * 4), image.width * 4, 1,
+                                        alone.data());
+                    ASSERT_TRUE(std::equal(alone.begin(), alone.end(), &all[i * 8])) << kernel.name << " block " << i;
+                }
+            }
         }
     }
-    EXPECT_EQ(best_bc1_kernel(), widest);
+}
+
+TEST(Bc1HighQuality, IsNotWorseThanNormalOnAnyScene) {
+    for (const Scene& scene : scenes()) {
+        const Image image = scene.paint();
+        const double normal = psnr_db(image, encoded(image));
+        const double high = psnr_db(image, encoded(image, best_bc1_kernel(TextureQuality::high)));
+        const double gain = scene.name == "Noise" ? 0.01 : 0.1;
+        EXPECT_GE(high, normal + gain) << scene.name;
+        RecordProperty(scene.name, std::to_string(high) + " dB, normal " + std::to_string(normal) + " dB");
+    }
+}
+
+TEST(Bc1HighQuality, IsWhatEncodeBc1RowGivesWhenAsked) {
+    const Image image = random_blocks(24, true);
+    const std::size_t blocks = image.width / 4;
+    std::vector<std::uint8_t> asked(blocks * 8);
+    encode_bc1_row(image.rgba.data(), image.width * 4, blocks, asked.data(), TextureQuality::high);
+    std::vector<std::uint8_t> wanted = encoded(image, best_bc1_kernel(TextureQuality::high));
+    wanted.resize(asked.size());
+    EXPECT_EQ(asked, wanted);
+    std::vector<std::uint8_t> normal = encoded(image);
+    normal.resize(asked.size());
+    EXPECT_NE(asked, normal);
+}
+
+TEST(Bc1HighQuality, TexelsDecodeTransparentExactlyBelowAlpha128) {
+    const Image image = random_blocks(25, true);
+    const std::vector<std::uint8_t> blocks = encoded(image, best_bc1_kernel(TextureQuality::high));
+    const std::size_t across = image.width / 4;
+    for (std::size_t i = 0; i < blocks.size() / 8; ++i) {
+        const std::array<Texel, 16> texels = decoded(&blocks[i * 8]);
+        for (std::size_t k = 0; k < 16; ++k) {
+            const std::uint8_t* source = image.texel(i % across * 4 + k % 4, i / across * 4 + k / 4);
+            ASSERT_EQ(texels[k][3], source[3] < 128 ? 0 : 255) << "block " << i << " texel " << k;
+        }
+    }
 }
 
 }  // namespace

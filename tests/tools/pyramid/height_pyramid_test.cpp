@@ -15,6 +15,16 @@ namespace {
 
 constexpr double kVoid = std::numeric_limits<double>::quiet_NaN();
 
+HeightPyramidJob job_of(HeightSpool& spool, TileWriter& writer, const Lattice& lattice,
+                        const HeightQuantizer& quantizer) {
+    HeightPyramidJob job;
+    job.spool = &spool;
+    job.writer = &writer;
+    job.lattice = lattice;
+    job.quantizer = quantizer;
+    return job;
+}
+
 // A small DEM, spooled and built; beside it the truth, sample by sample.
 class BuiltPyramid {
 public:
@@ -52,8 +62,13 @@ public:
         }
         auto writer = SqliteStoreWriter::create(folder_.file("s.scree"));
         EXPECT_TRUE(writer);
-        auto built = build_height_pyramid({spool->get(), writer->get(), lattice_, quantizer_, {}});
+        TileWriter tiles(**writer);
+        HeightPyramidJob job = job_of(**spool, tiles, lattice_, quantizer_);
+        index_ = std::make_unique<HeightIndex>(lattice_, lattice_.deepest_level);
+        job.index = index_.get();
+        auto built = build_height_pyramid(job);
         EXPECT_TRUE(built);
+        EXPECT_TRUE(tiles.flush());
         result_ = *built;
         if (result_.tile_count == 0) return;
         Dataset d;
@@ -82,7 +97,7 @@ public:
                 for (std::int64_t x = 0; x < lattice_.tiles_x(level); ++x) {
                     const TileId id{level, x, y};
                     SCOPED_TRACE("tile " + std::to_string(level) + "/" + std::to_string(x) + "/" + std::to_string(y));
-                    ASSERT_EQ(result_.tiles.contains(id), has_present_cell(id));
+                    ASSERT_EQ(index_->stored(id), has_present_cell(id));
                     if (!has_present_cell(id)) continue;
                     ++tiles;
                     check_tile(id);
@@ -159,6 +174,10 @@ private:
                 want.max_n = std::max(want.max_n, z);
             }
         const bool deepest = id.level == lattice_.deepest_level;
+        if (deepest) {
+            EXPECT_EQ(index_->cells(id), tile->presence.empty() ? HeightIndex::Cells::all : HeightIndex::Cells::some);
+            EXPECT_FALSE(index_->refined(id));
+        }
         if (deepest)
             for (std::int64_t r = 0; r < m; ++r)
                 for (std::int64_t k = 0; k < m; ++k) {
@@ -204,6 +223,7 @@ private:
     std::vector<std::int32_t> values_;
     std::vector<std::uint8_t> valid_;
     HeightPyramidResult result_;
+    std::unique_ptr<HeightIndex> index_;
     std::unique_ptr<SqliteStore> store_;
     std::unique_ptr<TileReader> reader_;
     std::map<TileId, HeightBounds> bounds_;
@@ -220,6 +240,15 @@ TEST(HeightPyramid, SmallTerrainsEqualBruteForceTileByTile) {
                      ", voids " + std::to_string(voids) + " %");
         BuiltPyramid(width, height, n, voids, random).check();
     }
+}
+
+// More tiles than a thread takes at once, several levels over each.
+TEST(HeightPyramid, WideTerrainsEqualBruteForceToo) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed() + 2);
+    BuiltPyramid(300, 70, 3, 0, random).check();
+    BuiltPyramid(300, 70, 3, 40, random).check();
+    BuiltPyramid(150, 20, 2, 10, random).check();
 }
 
 TEST(HeightPyramid, ThinTerrainsHaveManyRoots) {
@@ -246,9 +275,10 @@ TEST(HeightPyramid, ErrorsOfTheGreatestReliefStayWithinTheFormat) {
     auto writer = SqliteStoreWriter::create(folder.file("s.scree"));
     ASSERT_TRUE(writer);
     const Lattice lattice = *make_lattice(0, 0, 1, kSamples - 1, kSamples - 1, 2);
-    auto built =
-        build_height_pyramid({spool->get(), writer->get(), lattice, {1, 0, 0, 1}, [](std::int64_t) { return true; }});
+    TileWriter tiles(**writer);
+    auto built = build_height_pyramid(job_of(**spool, tiles, lattice, {1, 0, 0, 1}));
     ASSERT_TRUE(built) << built.error().message;
+    ASSERT_TRUE(tiles.flush());
     Dataset dataset;
     dataset.lattice = lattice;
     dataset.height_tiles = built->tile_count;
@@ -276,11 +306,13 @@ TEST(HeightPyramid, StopsWhenAsked) {
     auto writer = SqliteStoreWriter::create(folder.file("s.scree"));
     ASSERT_TRUE(writer);
     std::int64_t seen = 0;
-    auto built = build_height_pyramid(
-        {spool->get(), writer->get(), *make_lattice(0, 0, 1, 19, 19, 2), {1, 0, 0, 1}, [&](std::int64_t rows) {
-             seen = rows;
-             return rows < 7;
-         }});
+    TileWriter tiles(**writer);
+    HeightPyramidJob job = job_of(**spool, tiles, *make_lattice(0, 0, 1, 19, 19, 2), {1, 0, 0, 1});
+    job.on_rows = [&](std::int64_t rows) {
+        seen = rows;
+        return rows < 7;
+    };
+    auto built = build_height_pyramid(job);
     ASSERT_FALSE(built);
     EXPECT_EQ(built.error().code, ErrorCode::interrupted);
     EXPECT_EQ(seen, 7);

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "common/dataset.h"
@@ -133,6 +134,51 @@ TEST(HeightQuantizer, EveryRangeThatIsAcceptedFits) {
             ASSERT_LE(q->error_m(raw), q->quantum_m * 0.5000001 + 1e-8) << "raw " << raw << " quantum " << q->quantum_m;
             ASSERT_LE(std::abs(q->quantize(raw)), kMaxHeightUnits);
         }
+    }
+}
+
+// As the header says it.
+std::int32_t plain_quantize(const HeightQuantizer& q, double raw) {
+    const double n = std::nearbyint((raw * q.scale + q.offset_m - q.height_offset_m) / q.quantum_m);
+    return static_cast<std::int32_t>(std::clamp<double>(n, -kMaxHeightUnits, kMaxHeightUnits));
+}
+
+template <class T>
+void expect_rows_like_values(const HeightQuantizer& q, const std::vector<T>& raw,
+                             const std::vector<std::uint8_t>& valid) {
+    std::vector<std::int32_t> out(raw.size());
+    const QuantizedRange range = q.quantize(std::span<const T>(raw), valid, out);
+    QuantizedRange want;
+    for (std::size_t i = 0; i < raw.size(); ++i) {
+        const auto value = static_cast<double>(raw[i]);
+        ASSERT_EQ(out[i], plain_quantize(q, value)) << value << " in steps of " << q.quantum_m;
+        ASSERT_EQ(out[i], q.quantize(value));
+        if (valid.empty() || valid[i] != 0) want.include({out[i], out[i], q.error_m(value)});
+    }
+    EXPECT_EQ(range.min_n, want.min_n);
+    EXPECT_EQ(range.max_n, want.max_n);
+    EXPECT_EQ(range.worst_error_m, want.worst_error_m);
+}
+
+TEST(HeightQuantizer, RowsAreQuantisedAsValuesAre) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    for (int k = 0; k < 600 && !::testing::Test::HasFailure(); ++k) {
+        const double quantum = k % 3 == 0 ? 1.0 / 64 : k % 3 == 1 ? 0.1 : std::ldexp(3.0, test::uniform(random, -8, 3));
+        const HeightQuantizer q{k % 2 == 0 ? 1 : 0.3048, k % 5 == 0 ? -12.5 : 0, k % 7 == 0 ? 1000.0 : 0.0, quantum};
+        const auto count = static_cast<std::size_t>(test::uniform(random, 1, 70));
+        std::vector<double> raw(count);
+        for (double& v : raw) {
+            v = std::uniform_real_distribution<double>(-20000, 20000)(random);
+            if (k % 4 == 0) v = (test::uniform(random, -2000000, 2000000) + 0.5) * quantum;  // halves go to even
+            if (k % 4 == 1) v *= 1e4;  // beyond what a quantum holds
+        }
+        std::vector<std::uint8_t> valid;
+        if (k % 3 != 0)
+            for (std::size_t i = 0; i < count; ++i)
+                valid.push_back(static_cast<std::uint8_t>(test::uniform(random, 0, 1)));
+        expect_rows_like_values(q, raw, valid);
+        expect_rows_like_values(q, std::vector<float>(raw.begin(), raw.end()), valid);
     }
 }
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -149,6 +150,59 @@ TEST(HeightSpool, VoidAndUncoveredSamplesStayApart) {
         EXPECT_EQ(valid, (std::vector<std::uint8_t>{1, 0, 1, 1, 1, 0}));
         ASSERT_TRUE((*spool)->read_valid(0, valid));
         EXPECT_EQ(valid, (std::vector<std::uint8_t>{1, 0, 1, 1, 1, 0}));
+    }
+}
+
+// A spool that rows were appended to one by one as doubles, and one that got some at a time as floats.
+TEST(HeightSpool, FloatsAndSeveralRowsAtOnceAreTheSame) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    for (int round = 0; round < 40; ++round) {
+        const test::TemporaryFolder folder;
+        const int width = test::uniform(random, 1, 60), height = test::uniform(random, 1, 20);
+        auto single = HeightSpool::create(folder.file("a"), width, height, false);
+        auto grouped = HeightSpool::create(folder.file("b"), width, height, false);
+        ASSERT_TRUE(single && grouped);
+        std::vector<float> rows(static_cast<std::size_t>(width * height));
+        const int percent = round % 3 == 0 ? 0 : test::uniform(random, 1, 99);
+        for (float& v : rows) {
+            v = static_cast<float>(test::uniform(random, -100000, 100000)) / 16;
+            if (test::uniform(random, 0, 99) < percent) {
+                const int kind = test::uniform(random, 0, 2);
+                v = kind == 0 ? NAN : kind == 1 ? INFINITY : -INFINITY;
+            }
+        }
+        rows[static_cast<std::size_t>(test::uniform(random, 0, width * height - 1))] = 7;
+        for (int j = 0; j < height; ++j) {
+            const auto row = rows.begin() + j * width;
+            ASSERT_TRUE((*single)->append(std::vector<double>(row, row + width)));
+        }
+        for (int j = 0; j < height;) {
+            const int count = std::min(test::uniform(random, 1, 7), height - j);
+            const auto row = rows.begin() + j * width;
+            ASSERT_TRUE((*grouped)->append(std::vector<float>(row, row + count * width)));
+            j += count;
+        }
+        auto one = (*single)->finish(), other = (*grouped)->finish();
+        ASSERT_TRUE(one && other);
+        EXPECT_EQ(one->valid_samples, other->valid_samples);
+        EXPECT_EQ(one->min_raw, other->min_raw);
+        EXPECT_EQ(one->max_raw, other->max_raw);
+        const auto columns = static_cast<std::size_t>(width);
+        std::vector<double> values(columns), stored(columns), stored_too(columns);
+        std::vector<float> narrow(columns);
+        std::vector<std::uint8_t> valid(columns), valid_too(columns);
+        for (int j = 0; j < height; ++j) {
+            ASSERT_TRUE((*single)->read_row(j, values, valid));
+            ASSERT_TRUE((*grouped)->read_row(j, narrow, valid_too));
+            EXPECT_EQ(values, std::vector<double>(narrow.begin(), narrow.end())) << "row " << j;
+            EXPECT_EQ(valid, valid_too);
+            EXPECT_EQ((*single)->may_lack_samples(j), (*grouped)->may_lack_samples(j));
+            ASSERT_TRUE((*single)->read_samples(0, j, stored));
+            ASSERT_TRUE((*grouped)->read_samples(0, j, stored_too));
+            for (std::size_t i = 0; i < columns; ++i)
+                ASSERT_TRUE(stored[i] == stored_too[i] || (std::isnan(stored[i]) && std::isnan(stored_too[i])));
+        }
     }
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "tests/common/test_support.h"
+#include "tools/pyramid/texture_filter_kernel.h"
 
 namespace scree {
 namespace {
@@ -96,6 +97,42 @@ TEST(TextureFilter, ARowIsFilteredTexelByTexel) {
         for (std::size_t c = 0; c < 4; ++c) ASSERT_EQ(out[4 * k + c], want[c]);
     }
     for (std::size_t c = 0; c < 4; ++c) EXPECT_EQ(out[4 * 33 + c], 77) << "wrote past its end";
+}
+
+TEST(TextureFilter, TheVectorRowGivesTheBytesOfTheScalarOne) {
+    if (!filter_row_avx512_runs_here()) GTEST_SKIP() << "this processor has no AVX-512 VBMI";
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    for (std::size_t count = 0; count <= 140; ++count) {
+        for (int kind = 0; kind < 5; ++kind) {
+            std::vector<std::uint8_t> upper(8 * count), lower(8 * count), want(4 * count + 4, 77),
+                got(4 * count + 4, 77);
+            for (auto* row : {&upper, &lower})
+                for (std::size_t i = 0; i < row->size(); ++i) {
+                    (*row)[i] = static_cast<std::uint8_t>(kind == 3 ? random() % 16 : random());
+                    const bool rim = random() % 40 == 0;
+                    if (i % 4 == 3 && kind < 4) (*row)[i] = kind == 1 ? 0 : kind == 2 && rim ? 254 : 255;
+                }
+            filter_row_scalar(filter_tables(), upper.data(), lower.data(), static_cast<std::int64_t>(count),
+                              want.data());
+            filter_row_avx512(filter_tables(), upper.data(), lower.data(), static_cast<std::int64_t>(count),
+                              got.data());
+            ASSERT_EQ(got, want) << count << " texels, kind " << kind;
+        }
+    }
+}
+
+TEST(TextureFilter, TheVectorRowGivesEveryMeanAsTheScalarOne) {
+    if (!filter_row_avx512_runs_here()) GTEST_SKIP() << "this processor has no AVX-512 VBMI";
+    // All pairs of levels: every entry of the way there and thousands of the way back.
+    std::vector<std::uint8_t> upper(8 * 256), want(4 * 256), got(4 * 256);
+    for (int a = 0; a < 256; ++a) {
+        for (std::size_t i = 0; i < upper.size(); ++i)
+            upper[i] = static_cast<std::uint8_t>(i % 4 == 3 ? 255 : i % 8 < 4 ? a : static_cast<int>(i / 8));
+        filter_row_scalar(filter_tables(), upper.data(), upper.data(), 256, want.data());
+        filter_row_avx512(filter_tables(), upper.data(), upper.data(), 256, got.data());
+        ASSERT_EQ(got, want) << a;
+    }
 }
 
 }  // namespace

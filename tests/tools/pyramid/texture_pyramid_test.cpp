@@ -5,9 +5,12 @@
 #include <cstring>
 #include <map>
 
+#include "common/store/sqlite_store.h"
+#include "common/store/texture_codec.h"
 #include "tests/common/test_support.h"
 #include "tools/pyramid/bc1_encoder.h"
 #include "tools/pyramid/texture_filter.h"
+#include "tools/pyramid/tile_set.h"
 
 namespace scree {
 namespace {
@@ -53,33 +56,10 @@ public:
             }
         auto writer = SqliteStoreWriter::create(folder_.file("s.scree"));
         EXPECT_TRUE(writer);
-        TexturePyramid pyramid({writer->get(), lattice_, size_log2, deepest_, &tiles_});
-        EXPECT_EQ(side_ % pyramid.rows_per_push(), 0);
-        EXPECT_EQ(pyramid.width() % side_, 0);
-        EXPECT_EQ(pyramid.height() % side_, 0);
-        EXPECT_GE(pyramid.width(), cells_x << texels_log2);
-        EXPECT_GE(pyramid.height(), cells_y << texels_log2);
-        EXPECT_LE(pyramid.width(), finest.width);
-        EXPECT_LE(pyramid.height(), finest.height);
-        for (std::int64_t r = 0; r < pyramid.height(); r += pyramid.rows_per_push()) {
-            std::memset(pyramid.rows(), 0, static_cast<std::size_t>(4 * pyramid.width() * pyramid.rows_per_push()));
-            for (std::int64_t k = 0; k < pyramid.rows_per_push(); ++k)
-                for (std::int64_t x = 0; x < pyramid.width(); ++x) {
-                    const std::int64_t i = x >> texels_log2, j = (r + k) >> texels_log2;
-                    if (i >= cells_x || j >= cells_y || present[static_cast<std::size_t>(j * cells_x + i)] == 0)
-                        continue;
-                    const std::uint8_t texel[4] = {static_cast<std::uint8_t>(x * 3 + test::uniform(random, 0, 60)),
-                                                   static_cast<std::uint8_t>(r * 5),
-                                                   static_cast<std::uint8_t>(test::uniform(random, 0, 255)), 255};
-                    std::memcpy(pyramid.rows() + 4 * (k * pyramid.width() + x), texel, 4);
-                    std::memcpy(finest.at(x, r + k), texel, 4);
-                }
-            const auto ok = pyramid.push();
-            EXPECT_TRUE(ok) << ok.error().message;
-        }
-        auto written = pyramid.finish();
-        EXPECT_TRUE(written);
-        written_ = *written;
+        levels_[deepest_] = std::move(finest);
+        fill(cells_x, cells_y, texels_log2, present, random);
+        root_level_ = std::max(0, deepest_ - test::uniform(random, 0, 3));
+        build(**writer);
         Dataset d;
         d.lattice = lattice_;
         d.texture_size_log2 = size_log2;
@@ -90,13 +70,11 @@ public:
         EXPECT_TRUE(ok) << ok.error().message;
         store_ = std::move(*SqliteStore::open(folder_.file("s.scree")));
         reader_ = std::move(*store_->open_reader());
-        levels_[deepest_] = std::move(finest);
-        for (int level = deepest_ - 1; level >= -size_log2; --level) levels_[level] = levels_[level + 1].halved();
     }
 
     void check() {
         std::int64_t tiles = 0;
-        for (int level = deepest_; level >= 0; --level)
+        for (int level = deepest_; level >= root_level_; --level)
             for (std::int64_t y = 0; y < lattice_.tiles_y(level); ++y)
                 for (std::int64_t x = 0; x < lattice_.tiles_x(level); ++x) {
                     const TileId id{level, x, y};
@@ -114,6 +92,79 @@ public:
     }
 
 private:
+    void fill(std::int64_t cells_x, std::int64_t cells_y, int texels_log2, const std::vector<std::uint8_t>& present,
+              test::Random& random) {
+        Texels& finest = levels_[deepest_];
+        for (std::int64_t y = 0; y < cells_y << texels_log2; ++y)
+            for (std::int64_t x = 0; x < cells_x << texels_log2; ++x) {
+                const std::int64_t i = x >> texels_log2, j = y >> texels_log2;
+                if (present[static_cast<std::size_t>(j * cells_x + i)] == 0) continue;
+                const std::uint8_t texel[4] = {static_cast<std::uint8_t>(x * 3 + test::uniform(random, 0, 60)),
+                                               static_cast<std::uint8_t>(y * 5),
+                                               static_cast<std::uint8_t>(test::uniform(random, 0, 255)), 255};
+                std::memcpy(finest.at(x, y), texel, 4);
+            }
+        for (int level = deepest_ - 1; level >= -size_log2_; --level) levels_[level] = levels_[level + 1].halved();
+    }
+    // Rectangle by rectangle: all at once where the root level is 0 and there is one root.
+    void build(SqliteStoreWriter& writer) {
+        const std::int64_t columns = (levels_[root_level_].width / side_ + 1) / 2;
+        std::int64_t covered = 0;
+        for (std::int64_t y = 0; y < levels_[root_level_].height / side_; ++y)
+            for (std::int64_t x = 0; x < levels_[root_level_].width / side_; x += columns)
+                covered += build(writer, x, y, columns);
+        EXPECT_GE(covered, lattice_.cells_x * lattice_.cells_y);
+    }
+    std::int64_t build(SqliteStoreWriter& writer, std::int64_t x0, std::int64_t y0, std::int64_t columns) {
+        TexturePyramidJob job;
+        job.lattice = lattice_;
+        job.texture_size_log2 = size_log2_;
+        job.deepest_level = deepest_;
+        job.root_level = root_level_;
+        job.first_column = x0;
+        job.first_row = y0;
+        job.columns = columns;
+        job.rows = 1;
+        job.stored = [&](TileId id) { return tiles_.contains(id); };
+        job.shared_levels = lattice_.deepest_level;
+        job.sink = [&](TileId id, const std::vector<std::uint8_t>& payload) {
+            return writer.put(TileKind::texture, *tile_key(lattice_, id), static_cast<int>(TextureCodec::split),
+                              payload);
+        };
+        TexturePyramid pyramid(job);
+        const auto extent = pyramid.extent();
+        EXPECT_EQ(side_ % pyramid.rows_per_push(), 0);
+        EXPECT_EQ(extent.columns % side_, 0);
+        EXPECT_EQ(extent.rows % side_, 0);
+        EXPECT_EQ(extent.first_column, x0 * side_ << (deepest_ - root_level_));
+        EXPECT_EQ(extent.first_row, y0 * side_ << (deepest_ - root_level_));
+        if (extent.columns == 0 || extent.rows == 0) return 0;
+        const std::int64_t step = pyramid.rows_per_push();
+        int buffer = 0;
+        for (std::int64_t r = 0; r < extent.rows; r += step, buffer = 1 - buffer) {
+            for (std::int64_t k = 0; k < step; ++k)
+                std::memcpy(pyramid.rows(buffer) + 4 * k * extent.columns,
+                            levels_[deepest_].at(extent.first_column, extent.first_row + r + k),
+                            static_cast<std::size_t>(4 * extent.columns));
+            const auto ok = pyramid.push(buffer);
+            EXPECT_TRUE(ok) << ok.error().message;
+        }
+        auto written = pyramid.finish();
+        EXPECT_TRUE(written);
+        written_ += *written;
+        check_seeds(pyramid, x0, y0);
+        return extent.columns * extent.rows;
+    }
+    void check_seeds(const TexturePyramid& pyramid, std::int64_t x0, std::int64_t y0) {
+        const TexturePyramid::Seeds& seeds = pyramid.seeds();
+        Texels& level = levels_[root_level_];
+        EXPECT_EQ(seeds.rows, side_);
+        for (std::int64_t r = 0; r < seeds.rows; ++r)
+            EXPECT_EQ(std::memcmp(seeds.rgba.data() + 4 * r * seeds.columns, level.at(x0 * side_, y0 * side_ + r),
+                                  static_cast<std::size_t>(4 * seeds.columns)),
+                      0);
+    }
+
     bool exists(TileId id) {
         if (id.level > deepest_) return false;
         if (id.level <= lattice_.deepest_level) return tiles_.contains(id);
@@ -146,7 +197,7 @@ private:
                 }
             const std::uint8_t* found = tile->blocks.data() + bc1_mip_offset(size_log2_, mip);
             ASSERT_EQ(std::memcmp(found, want.data(), want.size()), 0);
-            if (mip == 0 || side < 4 || id.level - mip < 0) continue;
+            if (mip == 0 || side < 4 || id.level - mip < root_level_) continue;
             // The same blocks as in the ancestor's own finest mip.
             auto ancestor = read_texture_tile(*reader_, store_->dataset(), ancestor_at(id, id.level - mip));
             ASSERT_TRUE(ancestor) << ancestor.error().message;
@@ -161,7 +212,7 @@ private:
     }
 
     test::TemporaryFolder folder_;
-    int size_log2_, deepest_ = 0;
+    int size_log2_, deepest_ = 0, root_level_ = 0;
     std::int64_t side_;
     Lattice lattice_;
     TileSet tiles_;

@@ -25,6 +25,22 @@ std::optional<std::string> warning_of(const ImageInfo& info, const std::vector<d
     return suspects.warning("a.tif");
 }
 
+// One value after the other, by the header's words: what stands in the middle of many must not be passed over.
+TEST(SuspectValues, AreFoundWhereverTheyStand) {
+    for (const std::size_t size : {1u, 3u, 8u, 1023u, 1024u, 1025u, 5000u})
+        for (std::size_t at = 0; at < size; at += size < 100 ? 1 : size / 13) {
+            std::vector<double> values(size, 12.5);
+            for (std::size_t i = 0; i < size; i += 5) values[i] = std::numeric_limits<double>::quiet_NaN();
+            values[at] = -32767;
+            EXPECT_TRUE(warning_of(info_of(SampleType::f32), values)) << size << ", " << at;
+            SuspectValues suspects(info_of(SampleType::f32), {});
+            suspects.add(std::vector<float>(values.begin(), values.end()));
+            EXPECT_EQ(suspects.warning("a.tif"), warning_of(info_of(SampleType::f32), values)) << size << ", " << at;
+            values[(at + size / 2) % size] = -32700;  // ground beside it, unless it is the same sample
+            EXPECT_FALSE(warning_of(info_of(SampleType::f32), values)) << size << ", " << at;
+        }
+}
+
 TEST(SuspectValues, NamesFileCountValueAndRemedy) {
     std::vector<double> values(1234567, -32767);
     values.push_back(12);

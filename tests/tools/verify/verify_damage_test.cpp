@@ -1,4 +1,5 @@
 // One thing damaged at a time, and verify says which.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sqlite3.h>
 
@@ -301,6 +302,29 @@ TEST(VerifyDamage, TheSchema) {
     EXPECT_TRUE(names(verify_after({}, "INSERT INTO dataset SELECT 2, codec, checksum, payload FROM dataset"),
                       "table 'dataset' has 2 rows"));
     EXPECT_TRUE(names(verify_after({}, "CREATE TABLE more(x)"), "is damaged")) << "written without page checksums";
+}
+
+TEST(VerifyDamage, AStoreWithoutATableOfSeedsIsOne) {
+    const VerifyReport report = verify_after({}, "DROP TABLE seed");
+    EXPECT_FALSE(names(report, "schema"));
+    EXPECT_FALSE(names(report, "SQLite"));
+    EXPECT_TRUE(names(verify_after({}, "DROP TABLE seed; CREATE TABLE seed(key INTEGER PRIMARY KEY, codec)"),
+                      "table 'seed' has other columns"));
+}
+
+TEST(VerifyDamage, Seeds) {
+    test::SmallTerrain terrain = kTerrain;
+    terrain.texture_deepest_level = 4;
+    const auto row = [](std::int64_t key) {
+        const std::vector<std::uint8_t> payload{1};
+        return fmt::format("INSERT INTO seed VALUES({}, 0, {}, x'01')", key,
+                           static_cast<std::int64_t>(row_checksum(static_cast<int>(TileKind::seed), key, 0, payload)));
+    };
+    const VerifyReport sound = verify_after({}, row(2), terrain);
+    for (const char* text : {"seed 0/0/0", "seed level", "checksum", "key"}) EXPECT_FALSE(names(sound, text));
+    EXPECT_TRUE(names(verify_after({}, row(2) + "; UPDATE seed SET payload = x'02'", terrain), "seed 0/0/0: checksum"));
+    EXPECT_TRUE(names(verify_after({}, row(8), terrain), "seed 1/0/0 is not of the seed level 0"));
+    EXPECT_TRUE(names(verify_after({}, row(0), terrain), "table 'seed': 0 is no key of this lattice"));
 }
 
 TEST(VerifyDamage, AViewInPlaceOfATableIsNotQueriedAtAll) {

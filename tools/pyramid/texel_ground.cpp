@@ -1,0 +1,183 @@
+#include "tools/pyramid/texel_ground.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <mutex>
+
+#include "common/store/height_codec.h"
+#include "tools/pyramid/tint.h"
+#include "tools/stage_clock.h"
+
+namespace scree {
+
+// What has been read of a tile of the base's deepest level.
+struct TexelGround::Tile {
+    std::int64_t y = -1;
+    bool loaded = false, leaves_loaded = false;
+    std::vector<std::uint8_t> present;  // a byte a cell; empty: all
+    std::vector<std::uint8_t> tint;     // RGBA a cell
+    // Under a refined tile: its refined descendants, and which cells of leaves that lack some are present.
+    std::unordered_map<TileId, std::uint8_t, TileIdHash> child_masks;
+    std::unordered_map<TileId, std::vector<std::uint8_t>, TileIdHash> leaves;
+};
+
+TexelGround::TexelGround(const Dataset& dataset, const Lattice& base, const HeightIndex& index, HeightRowReader read)
+    : dataset_(dataset),
+      base_(base),
+      index_(index),
+      read_(std::move(read)),
+      texels_a_cell_(std::llround(base.spacing_m / dataset.texel_m(dataset.texture_deepest_level))) {}
+
+TexelGround::~TexelGround() = default;
+
+Result<void> TexelGround::finish(std::int64_t column, std::int64_t row, std::int64_t columns, std::int64_t rows,
+                                 std::uint8_t* rgba) {
+    const std::int64_t side = base_.tile_cells() * texels_a_cell_;  // texels along a tile
+    const std::int64_t first = column / side, end = (column + columns + side - 1) / side;
+    for (std::int64_t x = first; x < end; ++x) {
+        auto& tile = columns_[x];
+        if (!tile) tile = std::make_unique<Tile>();
+    }
+    std::vector<Tile*> tiles;
+    for (std::int64_t x = first; x < end; ++x) tiles.push_back(columns_[x].get());
+    std::mutex mutex;
+    Result<void> outcome;
+    tbb::parallel_for(std::int64_t{0}, end - first, [&](std::int64_t k) {
+        const StageClock::Scope clock(Stage::filter);
+        const std::int64_t x = first + k;
+        const std::int64_t west = std::max(x * side, column), east = std::min((x + 1) * side, column + columns);
+        for (std::int64_t r = row; r < row + rows;) {
+            const std::int64_t south = std::min((r / side + 1) * side, row + rows);
+            const Rectangle part{west, r, east - west, south - r};
+            const TileId id{base_.deepest_level, x, r / side};
+            std::uint8_t* corner = rgba + ((r - row) * columns + west - column) * 4;
+            if (auto ok = finish_part(*tiles[static_cast<std::size_t>(k)], id, part, corner, columns * 4); !ok) {
+                const std::lock_guard lock(mutex);
+                if (outcome) outcome = ok;
+                return;
+            }
+            r = south;
+        }
+    });
+    return outcome;
+}
+
+namespace {
+
+bool all_opaque(const std::uint8_t* rgba, std::int64_t columns) {
+    std::uint8_t alpha = 255;
+    for (std::int64_t c = 0; c < columns; ++c) alpha &= rgba[4 * c + 3];
+    return alpha == 255;
+}
+
+}  // namespace
+
+Result<void> TexelGround::finish_part(Tile& tile, TileId id, const Rectangle& part, std::uint8_t* rgba,
+                                      std::int64_t row_bytes) {
+    const bool refined = index_.refined(id);
+    const HeightIndex::Cells cells = refined ? HeightIndex::Cells::some : index_.cells(id);
+    if (tile.y != id.y) {
+        tile = {};
+        tile.y = id.y;
+    }
+    for (std::int64_t r = 0; r < part.rows; ++r) {
+        std::uint8_t* texels = rgba + r * row_bytes;
+        if (cells == HeightIndex::Cells::none) {
+            std::memset(texels, 0, static_cast<std::size_t>(part.columns * 4));
+            continue;
+        }
+        if (cells == HeightIndex::Cells::all && all_opaque(texels, part.columns)) continue;
+        if (!tile.loaded)
+            if (auto ok = load(tile, id); !ok) return ok;
+        if (refined && !tile.leaves_loaded)
+            if (auto ok = load_leaves(tile, id); !ok) return ok;
+        const std::int64_t m = base_.tile_cells();
+        const std::int64_t cell_row = (part.row + r) / texels_a_cell_ - id.y * m;
+        for (std::int64_t c = 0; c < part.columns; ++c) {
+            const std::int64_t cell = cell_row * m + (part.column + c) / texels_a_cell_ - id.x * m;
+            const bool present = refined ? leaf_present(tile, id, part.column + c, part.row + r)
+                                         : tile.present.empty() || tile.present[static_cast<std::size_t>(cell)] != 0;
+            std::uint8_t* texel = texels + 4 * c;
+            if (!present)
+                std::memset(texel, 0, 4);
+            else if (texel[3] < 128)
+                std::memcpy(texel, tile.tint.data() + 4 * cell, 4);
+            else
+                texel[3] = 255;
+        }
+    }
+    return {};
+}
+
+Result<void> TexelGround::load(Tile& tile, TileId id) const {
+    TileRow row;
+    auto found = read_(id, row);
+    if (!found) return found.error();
+    if (!*found)
+        return Error{ErrorCode::store, fmt::format("height tile {}/{}/{} is missing", id.level, id.x, id.y)};
+    auto decoded = decode_height_tile(row.payload, base_.tile_cells_log2, row.codec);
+    if (!decoded) return decoded.error();
+    tile.present = std::move(decoded->presence);
+    const auto m = static_cast<std::size_t>(base_.tile_cells());
+    std::vector<double> metres(decoded->samples.size());
+    std::transform(decoded->samples.begin(), decoded->samples.end(), metres.begin(),
+                   [&](std::int32_t n) { return dataset_.height_m(n); });
+    tile.tint.resize(m * m * 4);
+    const TintOptions options{dataset_.min_height_m, dataset_.max_height_m, base_.spacing_m};
+    for (std::size_t r = 0; r < m; ++r)
+        tint_row({metres.data() + r * (m + 1), m + 1}, {metres.data() + (r + 1) * (m + 1), m + 1}, options,
+                 {tile.tint.data() + r * m * 4, m * 4});
+    tile.loaded = true;
+    return {};
+}
+
+// Walks down from a refined tile: only marks are looked at, but of leaves that lack cells.
+Result<void> TexelGround::load_leaves(Tile& tile, TileId id) const {
+    std::vector<TileId> open{id};
+    TileRow row;
+    while (!open.empty()) {
+        const TileId at = open.back();
+        open.pop_back();
+        auto found = read_(at, row);
+        if (!found) return found.error();
+        const auto marks = *found ? height_marks(row.payload) : std::nullopt;
+        if (!marks)
+            return Error{ErrorCode::store, fmt::format("height tile {}/{}/{} is missing", at.level, at.x, at.y)};
+        if (marks->child_mask != 0) {
+            tile.child_masks.emplace(at, marks->child_mask);
+            for (int q = 0; q < 4; ++q)
+                if ((marks->child_mask >> q & 1) != 0) open.push_back(child_of(at, q));
+        } else if (marks->some_absent) {
+            auto decoded = decode_height_tile(row.payload, base_.tile_cells_log2, row.codec);
+            if (!decoded) return decoded.error();
+            tile.leaves.emplace(at, std::move(decoded->presence));
+        }
+    }
+    tile.leaves_loaded = true;
+    return {};
+}
+
+// The cell, of whichever leaf, that the texel's centre lies in.
+bool TexelGround::leaf_present(const Tile& tile, TileId id, std::int64_t column, std::int64_t row) const {
+    const Lattice& l = dataset_.lattice;
+    const double scale = std::ldexp(1.0, l.deepest_level - base_.deepest_level) / static_cast<double>(texels_a_cell_);
+    const auto i = static_cast<std::int64_t>((static_cast<double>(column) + 0.5) * scale),
+               j = static_cast<std::int64_t>((static_cast<double>(row) + 0.5) * scale);
+    for (auto refined = tile.child_masks.find(id); refined != tile.child_masks.end();
+         refined = tile.child_masks.find(id)) {
+        const std::int64_t extent = l.tile_extent(id.level + 1);
+        id = {id.level + 1, i / extent, j / extent};
+        if ((refined->second >> quadrant_of(id) & 1) == 0) return false;
+    }
+    const auto leaf = tile.leaves.find(id);
+    if (leaf == tile.leaves.end()) return true;
+    const LatticePoint corner = l.corner(id);
+    const std::int64_t step = l.step(id.level);
+    return leaf->second[static_cast<std::size_t>((j - corner.j) / step * l.tile_cells() + (i - corner.i) / step)] != 0;
+}
+
+}  // namespace scree

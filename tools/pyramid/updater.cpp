@@ -1,0 +1,509 @@
+#include "tools/pyramid/updater.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <tuple>
+
+#include "common/process_usage.h"
+#include "tools/partial_file.h"
+#include "tools/progress.h"
+#include "tools/pyramid/build_record.h"
+#include "tools/pyramid/height_stage.h"
+#include "tools/pyramid/texture_stage.h"
+#include "tools/source/fingerprint.h"
+#include "tools/source/isolated_decoder.h"
+#include "tools/source/source_list.h"
+
+namespace scree {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kHeights = "heights";
+constexpr const char* kImagery = "imagery";
+
+Error interrupted() { return {ErrorCode::interrupted, "stopped; the store is as it was"}; }
+
+std::string name_of(const std::string& path) { return fs::path(path).filename().string(); }
+
+// Where the files of the store lie now.
+class SourceFinder {
+public:
+    explicit SourceFinder(const UpdateOptions& options) {
+        const auto add = [&](const fs::path& folder) {
+            const fs::path f = folder.empty() ? fs::path(".") : folder;
+            if (std::find(folders_.begin(), folders_.end(), f) == folders_.end()) folders_.push_back(f);
+        };
+        for (const std::string& folder : options.sources) add(folder);
+        add(fs::path(options.store).parent_path());
+        for (const auto* list : {&options.dems, &options.images})
+            for (const std::string& path : *list) {
+                std::error_code error;
+                add(fs::is_directory(path, error) ? fs::path(path) : fs::path(path).parent_path());
+            }
+        add(".");
+    }
+
+    Result<std::string> find(const SourceRecord& record) const {
+        bool seen = false;
+        for (const fs::path& folder : folders_) {
+            const fs::path path = folder / record.name;
+            std::error_code error;
+            const auto bytes = fs::file_size(path, error);
+            if (error) continue;
+            seen = true;
+            if (static_cast<std::int64_t>(bytes) == record.bytes && fingerprint_of(path.string()) == record.fingerprint)
+                return path.string();
+        }
+        std::vector<std::string> names;
+        for (const fs::path& folder : folders_) names.push_back(folder.string());
+        return Error{ErrorCode::input,
+                     fmt::format("{}: a source of the store, {} in {}: the update must read it where it shows; "
+                                 "--sources FOLDER says where it is, --remove {} takes it out",
+                                 record.name, seen ? "is another file now" : "was not found",
+                                 fmt::join(names, ", "), record.name)};
+    }
+
+private:
+    std::vector<fs::path> folders_;
+};
+
+// Columns and rows of texels or districts.
+struct Box {
+    std::int64_t west = 0, north = 0, east = 0, south = 0;  // east and south are one past
+};
+
+class Update {
+public:
+    Update(const UpdateOptions& options, const std::atomic<bool>& stop) : options_(options), stop_(stop) {}
+
+    Result<UpdateReport> run() {
+        if (auto ok = open(); !ok) return ok.error();
+        if (auto ok = plan(); !ok) return ok.error();
+        if (auto ok = make(); !ok) return ok.error().code == ErrorCode::interrupted ? interrupted() : ok.error();
+        if (stop_) return interrupted();
+        if (auto ok = apply(); !ok) return ok.error();
+        return std::move(report_);
+    }
+
+private:
+    Result<void> open() {
+        auto store = SqliteStore::open(options_.store);
+        if (!store) return store.error();
+        store_ = std::move(*store);
+        for (const SourceRecord& s : dataset().sources)
+            if (s.fingerprint.empty() || !s.box_m)
+                return Error{ErrorCode::usage, fmt::format("{}: was built by a version that recorded neither the order "
+                                                           "of its sources nor its options; build it anew",
+                                                           options_.store)};
+        for (const std::string& name : options_.remove)
+            if (std::none_of(dataset().sources.begin(), dataset().sources.end(),
+                             [&](const SourceRecord& s) { return s.name == name; }))
+                return Error{ErrorCode::usage,
+                             fmt::format("--remove {}: the store has no source of that name; scree info lists them", name)};
+        return {};
+    }
+    const Dataset& dataset() const { return store_->dataset(); }
+
+    Result<void> plan() {
+        build_.out = options_.store + ".update";
+        build_.threads = options_.threads;
+        build_.memory_bytes = options_.memory_bytes;
+        build_.quiet = options_.quiet;
+        build_.attribution = options_.attribution.value_or(dataset().attribution);
+        if (auto ok = apply_record(dataset().options, build_); !ok)
+            return Error{ok.error().code, fmt::format("{}: {}", options_.store, ok.error().message)};
+        if (auto ok = list_files(); !ok) return ok;
+        if (build_.dems.empty())
+            return Error{ErrorCode::usage, fmt::format("{}: no source of heights would be left", options_.store)};
+        auto planned = plan_build(build_);
+        if (!planned) return planned.error();
+        plan_ = std::make_unique<BuildPlan>(std::move(*planned));
+        return check_reuse();
+    }
+
+    // The files of the store as it will be, bottom to top.
+    Result<void> list_files() {
+        const SourceFinder finder(options_);
+        auto new_dems = listed(options_.dems), new_images = listed(options_.images);
+        if (!new_dems) return new_dems.error();
+        if (!new_images) return new_images.error();
+        for (const SourceRecord& s : dataset().sources) {
+            const bool heights = s.role == kHeights;
+            auto& list = heights ? build_.dems : build_.images;
+            if (std::find(options_.remove.begin(), options_.remove.end(), s.name) != options_.remove.end()) continue;
+            auto& fresh = heights ? *new_dems : *new_images;
+            const auto same = std::find_if(fresh.begin(), fresh.end(),
+                                           [&](const std::string& path) { return name_of(path) == s.name; });
+            if (same != fresh.end()) {
+                list.push_back(*same);
+                named_.push_back(s.name);
+                fresh.erase(same);
+                continue;
+            }
+            auto found = finder.find(s);
+            if (!found) return found.error();
+            list.push_back(std::move(*found));
+        }
+        build_.dems.insert(build_.dems.end(), new_dems->begin(), new_dems->end());
+        build_.images.insert(build_.images.end(), new_images->begin(), new_images->end());
+        return {};
+    }
+
+    static Result<std::vector<std::string>> listed(const std::vector<std::string>& paths) {
+        if (paths.empty()) return std::vector<std::string>{};
+        return list_sources(paths);
+    }
+
+    Result<void> check_reuse() const {
+        const Dataset &was = dataset(), &is = plan_->dataset;
+        std::string what;
+        if (!(was.lattice == is.lattice))
+            what = fmt::format("the lattice would be {} x {} cells of {} m from {}, {} instead of {} x {} of {} m from {}, {}",
+                               is.lattice.cells_x, is.lattice.cells_y, is.lattice.spacing_m, is.lattice.origin_x_m,
+                               is.lattice.origin_y_m, was.lattice.cells_x, was.lattice.cells_y, was.lattice.spacing_m,
+                               was.lattice.origin_x_m, was.lattice.origin_y_m);
+        else if (was.crs != is.crs)
+            what = fmt::format("the CRS would be {} instead of {}", is.crs, was.crs);
+        else if (was.texture_deepest_level != is.texture_deepest_level)
+            what = fmt::format("the textures would have {} levels instead of {}", is.texture_deepest_level + 1,
+                               was.texture_deepest_level + 1);
+        else if (was.options != is.options)
+            what = "its options would be others";
+        if (what.empty()) return {};
+        return Error{ErrorCode::usage, fmt::format("{}: {}: every tile would change; use scree build", options_.store, what)};
+    }
+
+    Result<void> make() {
+        auto partial = PartialFile::create(build_.out);
+        if (!partial) return partial.error();
+        partial_ = std::move(*partial);
+        auto side = SqliteStoreWriter::create(build_.out);
+        if (!side) return side.error();
+        side_ = std::move(*side);
+        writer_ = std::make_unique<TileWriter>(*side_);
+        Progress progress("updating", "MPix", options_.quiet);
+        const Lattice base = plan_->mosaic.base_lattice();
+        index_ = std::make_unique<HeightIndex>(base, dataset().texture_deepest_level);
+        if (auto ok = make_heights(progress); !ok) return ok;
+        return make_textures(progress);
+    }
+
+    bool same_heights() const {
+        const auto records = [](const Dataset& d) {
+            std::vector<std::tuple<std::string, std::int64_t, std::string>> list;
+            for (const SourceRecord& s : d.sources)
+                if (s.role == kHeights) list.emplace_back(s.name, s.bytes, s.fingerprint);
+            return list;
+        };
+        return records(dataset()) == records(plan_->dataset) && options_.dems.empty();
+    }
+
+    Result<void> make_heights(Progress& progress) {
+        heights_made_ = !same_heights();
+        if (!heights_made_) {
+            dataset_ = dataset();
+            dataset_.sources = plan_->dataset.sources;
+            dataset_.options = plan_->dataset.options;
+            dataset_.attribution = plan_->dataset.attribution;
+            dataset_.has_imagery = plan_->dataset.has_imagery;
+            return index_->note_all(*store_);
+        }
+        auto made = build_heights(*plan_, build_, *writer_, *index_, progress, stop_);
+        if (!made) return made.error();
+        dataset_ = std::move(made->dataset);
+        report_.warnings = std::move(made->warnings);
+        return writer_->flush();
+    }
+
+    Result<bool> read_heights(TileId id, TileRow& row) {
+        const std::int64_t key = *tile_key(dataset_.lattice, id);
+        if (heights_made_) return writer_->read(TileKind::height, key, row);
+        const std::lock_guard lock(reading_);
+        return reader_->read(TileKind::height, id, row);
+    }
+
+    Result<void> make_textures(Progress& progress) {
+        auto reader = store_->open_reader();
+        if (!reader) return reader.error();
+        reader_ = std::move(*reader);
+        std::unique_ptr<ImageStack> imagery;
+        const MosaicPlan& m = plan_->mosaic;
+        if (!m.imagery.empty()) {
+            auto opened = ImageStack::open(m.imagery, m.image_layers, texel_grid(dataset_), m.crs,
+                                           {build_.kernel, plan_->open, build_, build_.out});
+            if (!opened) return opened.error();
+            imagery = std::move(*opened);
+        }
+        TextureStageJob job;
+        job.dataset = dataset_;
+        job.base = m.base_lattice();
+        job.index = index_.get();
+        job.heights = [&](TileId id, TileRow& row) { return read_heights(id, row); };
+        job.imagery = imagery.get();
+        job.writer = writer_.get();
+        job.quality = build_.texture_quality;
+        job.other_seeds = [&](std::int64_t key, TileRow& row) -> Result<bool> {
+            const TileId id = *tile_from_key(dataset_.lattice, key);
+            if (dirty_.at(static_cast<std::size_t>(id.y * columns_ + id.x)) != 0) return false;  // it has none now
+            const std::lock_guard lock(reading_);
+            return reader_->read(TileKind::seed, id, row);
+        };
+        job.stop = &stop_;
+        TextureStage stage(std::move(job));
+        columns_ = stage.district_columns();
+        rows_ = stage.district_rows();
+        if (auto ok = find_dirty(); !ok) return ok;
+        progress.set_total(static_cast<double>(report_.districts_built));
+        for (std::int64_t y = 0; y < rows_; ++y)
+            for (std::int64_t x = 0; x < columns_; ++x) {
+                if (!is_dirty(x, y)) continue;
+                std::int64_t end = x + 1;
+                while (end < columns_ && is_dirty(end, y)) ++end;
+                if (stop_) return interrupted();
+                if (auto ok = stage.build_districts(x, y, end - x, 1); !ok) return ok;
+                progress.add(static_cast<double>(end - x));
+                x = end;
+            }
+        if (report_.districts_built > 0)
+            if (auto ok = stage.build_crown(); !ok) return ok;
+        return writer_->flush();
+    }
+
+    bool is_dirty(std::int64_t x, std::int64_t y) const {
+        return dirty_[static_cast<std::size_t>(y * columns_ + x)] != 0;
+    }
+
+    // Texels of the deepest level along a district.
+    std::int64_t district_texels() const {
+        return std::int64_t{1} << (dataset_.texture_size_log2 + dataset_.texture_deepest_level - seed_level(dataset_));
+    }
+
+    void mark(const Box& texels) {
+        const std::int64_t side = district_texels();
+        const auto clip = [](std::int64_t v, std::int64_t count) { return std::clamp<std::int64_t>(v, 0, count); };
+        for (std::int64_t y = clip(texels.north / side, rows_); y < clip((texels.south + side - 1) / side, rows_); ++y)
+            for (std::int64_t x = clip(texels.west / side, columns_);
+                 x < clip((texels.east + side - 1) / side, columns_); ++x)
+                dirty_[static_cast<std::size_t>(y * columns_ + x)] = 1;
+    }
+
+    Result<void> find_dirty() {
+        dirty_.assign(static_cast<std::size_t>(columns_ * rows_), 0);
+        report_.districts = columns_ * rows_;
+        // The tint's colours span the range of heights.
+        const bool range = dataset_.min_height_m != dataset().min_height_m ||
+                           dataset_.max_height_m != dataset().max_height_m;
+        // Where depth varies the dense part, which the tint is made of, may have another depth.
+        const bool depth = plan_->mosaic.base_shift > 0 || dataset().coarsest_leaf_level;
+        const bool all = heights_made_ && (range || depth);
+        if (all)
+            std::fill(dirty_.begin(), dirty_.end(), std::uint8_t{1});
+        else
+            mark_images();
+        if (heights_made_ && !all)
+            if (auto ok = mark_heights(); !ok) return ok;
+        report_.districts_built = std::count(dirty_.begin(), dirty_.end(), 1);
+        return {};
+    }
+
+    // Files that came, went or changed; and those whose layer's grid begins elsewhere now, because positions are counted
+    // from there.
+    void mark_images() {
+        mark_differences(dataset(), plan_->dataset);
+        mark_differences(plan_->dataset, dataset());
+    }
+
+    void mark_differences(const Dataset& in, const Dataset& other) {
+        for (const SourceRecord& s : in.sources) {
+            if (s.role != kImagery) continue;
+            // What the user names is made again, whatever its fingerprint, which is of a part of the file.
+            const bool named = std::find(named_.begin(), named_.end(), s.name) != named_.end() ||
+                               std::find(options_.remove.begin(), options_.remove.end(), s.name) != options_.remove.end();
+            const auto same = std::find_if(other.sources.begin(), other.sources.end(), [&](const SourceRecord& o) {
+                return o.role == s.role && o.name == s.name && o.bytes == s.bytes && o.fingerprint == s.fingerprint;
+            });
+            if (named || same == other.sources.end())
+                mark_box(s, *s.box_m);
+            else if (same->layer != s.layer)
+                mark_sides(s, *same);
+        }
+    }
+
+    // The file is the same, its layer is not: all of it where samples are counted from elsewhere, else the sides that
+    // were the layer's, or are.
+    void mark_sides(const SourceRecord& s, const SourceRecord& other) {
+        const auto [west, south, east, north] = *s.box_m;
+        const std::size_t grid = s.layer.size() < 2 ? 0 : s.layer.size() - 2;
+        const auto digits = [&](const std::string& layer) {
+            return static_cast<unsigned>(std::strtoul(layer.c_str() + std::min(grid, layer.size()), nullptr, 16));
+        };
+        const unsigned mine = digits(s.layer), changed = mine ^ digits(other.layer);
+        if (s.layer.compare(0, grid, other.layer, 0, grid) != 0 || (mine & kStraight) == 0 || (changed & kStraight) != 0)
+            return mark_box(s, *s.box_m);
+        if ((changed & kWestSide) != 0) mark_box(s, {west, south, west, north});
+        if ((changed & kEastSide) != 0) mark_box(s, {east, south, east, north});
+        if ((changed & kNorthSide) != 0) mark_box(s, {west, north, east, north});
+        if ((changed & kSouthSide) != 0) mark_box(s, {west, south, east, south});
+    }
+
+    void mark_box(const SourceRecord& s, const std::array<double, 4>& box) {
+        const TargetGrid grid = texel_grid(dataset_);
+        const auto [west, south, east, north] = box;
+        const double wide = (*s.box_m)[2] - (*s.box_m)[0], high = (*s.box_m)[3] - (*s.box_m)[1];
+        // What a kernel reads around a point, in pixels; and what a curved side may reach out between the points that
+        // the box was made of.
+        const double pixel = std::max(wide / static_cast<double>(s.width), high / static_cast<double>(s.height));
+        const double reach = 4 * std::max(pixel, grid.step_m) + 0.01 * std::max(wide, high);
+        const auto texel = [&](double metres) { return static_cast<std::int64_t>(std::floor(metres / grid.step_m)); };
+        mark({texel(west - reach - grid.x_m), texel(grid.y_m - north - reach), texel(east + reach - grid.x_m) + 1,
+              texel(grid.y_m - south + reach) + 1});
+    }
+
+    // Where leaves differ, presence and tint may.
+    Result<void> mark_heights() {
+        const Lattice& l = dataset_.lattice;
+        const double texels_a_cell = l.spacing_m / dataset_.texel_m(dataset_.texture_deepest_level);
+        return for_each_changed_height([&](std::int64_t key, bool) -> Result<void> {
+            const TileId id = *tile_from_key(l, key);
+            if (id.level < plan_->mosaic.base_lattice().deepest_level) return {};
+            const double side = static_cast<double>(l.tile_extent(id.level)) * texels_a_cell;
+            const auto at = [&](std::int64_t tile) { return static_cast<std::int64_t>(static_cast<double>(tile) * side); };
+            mark({at(id.x), at(id.y), at(id.x + 1) + 1, at(id.y + 1) + 1});
+            return {};
+        });
+    }
+
+    // Visits (key, stored now?) of the height tiles that are not as they were.
+    Result<void> for_each_changed_height(const std::function<Result<void>(std::int64_t key, bool stored)>& visit) {
+        std::vector<std::int64_t> now, was;
+        if (auto ok = side_->for_each_key(TileKind::height, [&](std::int64_t key) { now.push_back(key); }); !ok) return ok;
+        TileRow fresh, held;
+        for (const std::int64_t key : now) {
+            auto read = writer_->read(TileKind::height, key, fresh);
+            if (!read) return read.error();
+            const std::lock_guard lock(reading_);
+            auto found = reader_->read(TileKind::height, *tile_from_key(dataset_.lattice, key), held);
+            if (!found) return found.error();
+            if (*found && held.codec == fresh.codec && held.payload == fresh.payload) continue;
+            if (auto ok = visit(key, true); !ok) return ok;
+        }
+        Result<void> outcome;
+        auto ok = store_->for_each(TileKind::height, [&](const SqliteStore::RowView& row) {
+            if (!std::binary_search(now.begin(), now.end(), row.key)) outcome = visit(row.key, false);
+            return outcome.ok();
+        });
+        return ok ? outcome : ok;
+    }
+
+    // One transaction.
+    Result<void> apply() {
+        if (auto ok = writer_->flush(); !ok) return ok;
+        auto target = SqliteStoreWriter::amend(options_.store);
+        if (!target) return target.error();
+        dataset_.height_tiles = 0;
+        for (const TileKind kind : {TileKind::height, TileKind::texture, TileKind::seed})
+            if (auto ok = apply(**target, kind); !ok) return ok;
+        dataset_.height_tiles = count(**target, TileKind::height);
+        dataset_.texture_tiles = count(**target, TileKind::texture);
+        if (auto ok = (*target)->finish(dataset_); !ok) return ok;
+        writer_.reset();
+        return {};
+    }
+
+    static std::int64_t count(const SqliteStoreWriter& store, TileKind kind) {
+        std::int64_t rows = 0;
+        const auto ok = store.for_each_key(kind, [&](std::int64_t) { ++rows; });
+        return ok ? rows : 0;
+    }
+
+    // Tiles that were made again: those that differ are written, those that are no more removed.
+    Result<void> apply(SqliteStoreWriter& target, TileKind kind) {
+        if (kind == TileKind::height && !heights_made_) return {};
+        std::vector<std::int64_t> made, gone;
+        if (auto ok = side_->for_each_key(kind, [&](std::int64_t key) { made.push_back(key); }); !ok) return ok;
+        if (auto ok = target.for_each_key(kind,
+                                          [&](std::int64_t key) {
+                                              if (!std::binary_search(made.begin(), made.end(), key) &&
+                                                  was_made_again(kind, key))
+                                                  gone.push_back(key);
+                                          });
+            !ok)
+            return ok;
+        std::int64_t& written =
+            kind == TileKind::height ? report_.height_tiles_written : report_.texture_tiles_written;
+        TileRow fresh, held;
+        for (const std::int64_t key : made) {
+            auto read = side_->read(kind, key, fresh);
+            if (!read) return read.error();
+            auto found = target.read(kind, key, held);
+            if (!found) return found.error();
+            if (*found && held.codec == fresh.codec && held.payload == fresh.payload) continue;
+            if (auto ok = target.put(kind, key, fresh.codec, fresh.payload); !ok) return ok;
+            if (kind != TileKind::seed) ++written;
+        }
+        for (const std::int64_t key : gone)
+            if (auto ok = target.remove(kind, key); !ok) return ok;
+        if (kind != TileKind::seed) report_.tiles_removed += static_cast<std::int64_t>(gone.size());
+        return {};
+    }
+
+    bool was_made_again(TileKind kind, std::int64_t key) const {
+        if (kind == TileKind::height) return true;
+        if (report_.districts_built == 0) return false;
+        const auto id = tile_from_key(dataset_.lattice, key);
+        const int seeds = seed_level(dataset_);
+        if (!id || id->level < seeds) return id.has_value();
+        const TileId district = ancestor_at(*id, seeds);
+        return district.x < columns_ && district.y < rows_ && is_dirty(district.x, district.y);
+    }
+
+    const UpdateOptions& options_;
+    const std::atomic<bool>& stop_;
+    UpdateReport report_;
+    std::unique_ptr<SqliteStore> store_;
+    std::unique_ptr<BuildPlan> plan_;
+    BuildOptions build_;
+    std::vector<std::string> named_;  // sources that new files replace
+    std::unique_ptr<PartialFile> partial_;
+    std::unique_ptr<SqliteStoreWriter> side_;
+    std::unique_ptr<TileWriter> writer_;
+    std::unique_ptr<HeightIndex> index_;
+    std::unique_ptr<TileReader> reader_;  // of the store as it is
+    std::mutex reading_;
+    Dataset dataset_;  // as it will be
+    bool heights_made_ = false;
+    std::int64_t columns_ = 0, rows_ = 0;  // of districts
+    std::vector<std::uint8_t> dirty_;
+};
+
+}  // namespace
+
+Result<UpdateReport> update_store(const UpdateOptions& options, const std::atomic<bool>& stop) {
+    const auto start = std::chrono::steady_clock::now();
+    const int threads =
+        options.threads > 0 ? options.threads : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+    auto report = Update(options, stop).run();
+    if (!report) return report;
+    const ProcessUsage usage = process_usage();
+    const DecoderUsage decoders = decoder_usage();
+    report->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    report->cpu_seconds = usage.cpu_seconds + decoders.cpu_seconds;
+    report->peak_rss_bytes = usage.peak_rss_bytes + decoders.peak_rss_bytes;
+    return report;
+}
+
+}  // namespace scree
