@@ -10,6 +10,9 @@
 
 namespace scree {
 
+/// Levels from the seeds to the deepest textures: 256 finest pixels to one of a seed.
+inline constexpr int kSeedLevelsUp = 4;
+
 enum class SeedCodec : int {
     left = 1  ///< channels apart, differences to the pixel before, Zstandard
 };

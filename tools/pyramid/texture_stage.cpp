@@ -23,7 +23,7 @@ Error interrupted() { return {ErrorCode::interrupted, "stopped"}; }
 
 }  // namespace
 
-int seed_level(const Dataset& d) { return std::max(0, d.texture_deepest_level - kDistrictLevels); }
+int seed_level(const Dataset& d) { return std::max(0, d.texture_deepest_level - kSeedLevelsUp); }
 
 TargetGrid texel_grid(const Dataset& d) {
     const double texel = d.texel_m(d.texture_deepest_level);
@@ -45,7 +45,7 @@ std::int64_t TextureStage::district_rows() const {
 }
 
 std::int64_t TextureStage::bytes_needed(const Dataset& d, std::int64_t texels_wide) {
-    const std::int64_t seeds = (texels_wide >> kDistrictLevels << d.texture_size_log2) * 4;
+    const std::int64_t seeds = (texels_wide >> kSeedLevelsUp << d.texture_size_log2) * 4;
     return TexturePyramid::bytes_needed(texels_wide, d.texture_size_log2) + 2 * seeds + (std::int64_t{24} << 20);
 }
 

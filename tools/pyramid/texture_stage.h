@@ -15,8 +15,6 @@
 
 namespace scree {
 
-/// Levels from the seeds to the deepest textures.
-inline constexpr int kDistrictLevels = 4;
 /// Level of the seeds, which is that of the districts' roots; 0: one district, no crown and no seeds.
 int seed_level(const Dataset& dataset);
 /// The grid of the texel centres of the deepest level.

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "common/store/page_checksum_vfs.h"
+#include "common/store/seed_codec.h"
 
 namespace scree {
 namespace {
@@ -19,7 +20,6 @@ namespace {
 constexpr std::array<std::string_view, 4> kTables{"height", "texture", "dataset", "seed"};
 constexpr std::size_t kRequiredTables = 3;
 constexpr int kPageBytes = 16384;
-constexpr int kSeedLevelsUp = 4;  // 256 finest pixels to one of a seed
 constexpr int kRowsBetweenAsking = 1024;
 
 using Database = std::unique_ptr<sqlite3, decltype(&sqlite3_close_v2)>;
@@ -197,10 +197,30 @@ Result<bool> check_layout(const std::string& path, ProblemList& problems) {
 
 namespace {
 
+// As many as textures of their level; keys of a level follow each other.
+Result<void> check_seed_count(const SqliteStore& store, int level, std::int64_t seeds, ProblemList& problems) {
+    auto db = Connection::open(store.path());
+    if (!db) return db.error();
+    auto tables = db->integer("SELECT count(*) FROM sqlite_master WHERE name = 'seed'");
+    if (!tables) return tables.error();
+    if (*tables == 0) return {};
+    const Lattice& l = store.dataset().lattice;
+    const std::int64_t first = (std::int64_t{1} << (2 * level)) * l.root_rows * l.root_columns;
+    auto textures =
+        db->integer(fmt::format("SELECT count(*) FROM texture WHERE key >= {} AND key < {}", first, 4 * first));
+    if (!textures) return textures.error();
+    if (*textures != seeds)
+        problems.add(fmt::format("table 'seed': {} rows for {} textures of level {}", seeds, *textures, level));
+    return {};
+}
+
 // No tile leads to a seed, so that each is met here.
 Result<void> check_seeds(const SqliteStore& store, ProblemList& problems, const std::function<bool()>& go_on) {
     const Dataset& dataset = store.dataset();
     const int seed_level = dataset.texture_deepest_level - kSeedLevelsUp;
+    const int size = dataset.texture_size();
+    const auto row_bytes = static_cast<std::size_t>(size) * 4;
+    std::vector<std::uint8_t> pixels(row_bytes * static_cast<std::size_t>(size));
     std::optional<std::int64_t> previous;
     std::int64_t count = 0;
     auto ok = store.for_each(TileKind::seed, [&](const SqliteStore::RowView& row) {
@@ -217,11 +237,13 @@ Result<void> check_seeds(const SqliteStore& store, ProblemList& problems, const 
         else if (!row.checksum_ok)
             problems.add(
                 fmt::format("seed {}/{}/{}: checksum does not match: the row is damaged", id->level, id->x, id->y));
+        else if (auto decoded = decode_seed(row.payload, row.codec, size, pixels.data(), row_bytes); !decoded)
+            problems.add(fmt::format("seed {}/{}/{}: {}", id->level, id->x, id->y, decoded.error().message));
         return ++count % kRowsBetweenAsking != 0 || go_on();
     });
     auto read = sound(ok, problems);
     if (!read) return read.error();
-    return {};
+    return seed_level > 0 && *read && go_on() ? check_seed_count(store, seed_level, count, problems) : Result<void>{};
 }
 
 }  // namespace
