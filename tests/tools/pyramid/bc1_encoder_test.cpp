@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <functional>
+#include <map>
 #include <random>
 #include <string>
 #include <vector>
@@ -601,13 +602,16 @@ TEST(Bc1Kernel, ABlockHasTheSameBytesWhereverItStands) {
     }
 }
 
-TEST(Bc1HighQuality, IsNotWorseThanNormalOnAnyScene) {
+TEST(Bc1HighQuality, GainsOnEveryScene) {
+    // In dB; about half of what the search among neighbouring codes contributes would be missing at these figures.
+    const std::map<std::string, double> least{{"Noise", 0.027}, {"Gradients", 0.65}, {"GreyGradient", 1.22},
+                                              {"Snow", 1.15},   {"Forest", 0.345},   {"Town", 0.88},
+                                              {"Sea", 0.35}};
     for (const Scene& scene : scenes()) {
         const Image image = scene.paint();
         const double normal = psnr_db(image, encoded(image));
         const double high = psnr_db(image, encoded(image, best_bc1_kernel(TextureQuality::high)));
-        const double gain = scene.name == "Noise" ? 0.01 : 0.1;
-        EXPECT_GE(high, normal + gain) << scene.name;
+        EXPECT_GE(high - normal, least.at(scene.name)) << scene.name;
         RecordProperty(scene.name, std::to_string(high) + " dB, normal " + std::to_string(normal) + " dB");
     }
 }
