@@ -45,7 +45,7 @@ std::shared_ptr<const TileStore> borrowed(const MemoryStore& store) { return {st
 
 class Takeover : public testing::Test {
 protected:
-    static constexpr int kThreads = 2;
+    static constexpr int kThreads = 3;
     void open(const SyntheticTerrain& terrain, const MemoryStore& store, const MemoryPlan& memory) {
         memory_ = memory;
         sink_ = std::make_unique<HeightSink>(memory);
@@ -99,6 +99,10 @@ protected:
                 const test::TilePlan& coming = of_coming.plan(pager_->coming(), i, j);
                 complete = coming.complete;
                 pager_->request(of_old, coming.wishes());
+                std::array<std::set<std::int32_t>, 2> kept;
+                walk(pager_->coming(), *coming_, kept);
+                for (const auto& [kind, id, slot] : coming.resident)
+                    EXPECT_TRUE(kept[static_cast<std::size_t>(kind)].contains(slot)) << "a planned tile went";
             } else {
                 pager_->request(of_old, {});
             }
@@ -212,6 +216,7 @@ TEST_F(Takeover, WhatWasBeingReadOfTheOldStateIsThrownAway) {
     begin(now, now_store);
     // Both places among the staged heights are taken by what nobody wants any more.
     pager_->request({}, {});
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
     EXPECT_EQ(now_store.reads_begun(), 0);
     old_store.release();
     while (!pager_->roots_ready()) {
@@ -263,17 +268,22 @@ TEST_F(Takeover, WhatIsReadAfterAnUpdateIsNeitherShownNorCalledDamaged) {
 }
 
 TEST_F(Takeover, DamagedTilesOfTheOldStateAreAskedForAnew) {
-    const SyntheticTerrain old = state(1), now = state(2);
-    MemoryStore old_store(old);
-    const MemoryStore now_store(now);
-    old_store.damage(TileKind::height, {1, 0, 0}, Damage::checksum);
+    const SyntheticTerrain old = state(1), bad = state(2), now = state(3);
+    const MemoryStore old_store(old), now_store(now);
+    MemoryStore bad_store(bad);
+    bad_store.damage(TileKind::height, {1, 0, 0}, Damage::checksum);
     open(old, old_store, {20, 20, 4, 0});
-    settle(0.5, 2, 2);
+    const auto take_over = [&](const SyntheticTerrain& terrain, const MemoryStore& store) {
+        begin(terrain, store);
+        settle(0.5, 2, 2);
+        switch_over();
+        settle(0.5, 2, 2);
+    };
+    // Often enough that every table serves twice.
+    take_over(bad, bad_store);
     EXPECT_EQ(damage_.size(), 1u);
-    begin(now, now_store);
-    settle(0.5, 2, 2);
-    switch_over();
-    settle(0.5, 2, 2);
+    take_over(now, now_store);
+    take_over(old, old_store);
     EXPECT_GE(pager_->residency().heights.children[static_cast<std::size_t>(pager_->residency().heights.roots[0])][0],
               0);
     EXPECT_EQ(damage_.size(), 1u);
@@ -298,7 +308,7 @@ TEST_F(Takeover, ADamagedRootLeavesWhatIsShown) {
         EXPECT_TRUE(pager_->gave_up());
         ASSERT_EQ(damage_.size(), 1u);
         EXPECT_NE(damage_[0].find("0/0/0"), std::string::npos) << damage_[0];
-        EXPECT_EQ(resident(pager_->residency(), old), before);
+        EXPECT_GE(resident(pager_->residency(), old) + 1, before) << "but for the slot that a root may have taken";
         frame(0.5, 20, 20, kNoLimit, false);
         begin(now, now_store);
         settle(0.5, 20, 20);
