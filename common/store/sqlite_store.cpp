@@ -112,6 +112,11 @@ std::optional<SqliteStore::FileIdentity> SqliteStore::identity_of(const std::str
 
 bool SqliteStore::has_changed() const { return identity_of(path_) != file_; }
 
+bool SqliteStore::is_rewritten() const {
+    const auto now = identity_of(path_);
+    return now && file_ && now->device == file_->device && now->inode == file_->inode && *now != *file_;
+}
+
 Result<std::unique_ptr<TileReader>> SqliteStore::open_reader() const {
     auto db = open_reading(path_);
     if (!db) return db.error();

@@ -46,6 +46,8 @@ public:
     Result<std::string> digest() const;
     /// The file under the path is no longer what was opened: updated in place, or replaced. Cheap: one stat().
     bool has_changed() const;
+    /// Updated in place. A file that was moved away or replaced reads as ever through what was opened before. Cheap.
+    bool is_rewritten() const override;
 
 private:
     struct FileIdentity {

@@ -38,6 +38,9 @@ public:
     virtual ~TileStore() = default;
     virtual const Dataset& dataset() const = 0;
     virtual Result<std::unique_ptr<TileReader>> open_reader() const = 0;
+    /// Readers of this store may see rows of a later state. What was read before this said false is of the state that
+    /// was opened.
+    virtual bool is_rewritten() const { return false; }
 };
 
 /// Reads and decodes; a missing tile is an error (ErrorCode::store) that names it.

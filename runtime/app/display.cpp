@@ -21,26 +21,46 @@ Result<std::unique_ptr<Display>> Display::create(const Scene& scene, const Displ
                        : create_headless_context();
     if (!context) return context.error();
     display->context_ = std::move(*context);
-    RendererOptions options;
-    options.lattice = d.lattice;
-    options.height_offset_m = d.height_offset_m;
-    options.height_quantum_m = d.height_quantum_m;
-    options.texture_size_log2 = d.texture_size_log2;
-    options.height_slots = static_cast<int>(scene.memory().height_slots);
-    options.texture_slots = static_cast<int>(scene.memory().texture_slots);
-    options.max_draws = options.height_slots + options.texture_slots;  // a page, or a part for each deep texture
-    auto renderer = Renderer::create(options);
-    if (!renderer) return renderer.error();
-    display->renderer_ = std::move(*renderer);
     display->samples_ = o.samples;
-    display->arena_bytes_ = renderer_bytes(options);
-    display->max_draws_ = options.max_draws;
-    display->tile_cells_log2_ = d.lattice.tile_cells_log2;
+    if (auto ok = display->make_renderer(d, scene.memory()); !ok) return ok.error();
     if (auto ok = display->resize(o.width_px, o.height_px); !ok) return ok.error();
     if (o.keep_heights) display->arena_ = std::make_unique<CpuArena>(d, scene.memory().height_slots);
     display->settings_ = scenery(d);
     display->renderer_->warm_up(display->settings_, *display->target_);
     return display;
+}
+
+Result<void> Display::make_renderer(const Dataset& d, const MemoryPlan& plan) {
+    RendererOptions options;
+    options.lattice = d.lattice;
+    options.height_offset_m = d.height_offset_m;
+    options.height_quantum_m = d.height_quantum_m;
+    options.texture_size_log2 = d.texture_size_log2;
+    options.height_slots = static_cast<int>(plan.height_slots);
+    options.texture_slots = static_cast<int>(plan.texture_slots);
+    options.max_draws = options.height_slots + options.texture_slots;  // a page, or a part for each deep texture
+    renderer_.reset();                                                 // never the memory of two
+    auto renderer = Renderer::create(options);
+    if (!renderer) return renderer.error();
+    renderer_ = std::move(*renderer);
+    renderer_options_ = options;
+    arena_bytes_ = renderer_bytes(options);
+    return {};
+}
+
+Result<void> Display::renew(const Dataset& d, const MemoryPlan& plan) {
+    const FrameSettings fresh = scenery(d);
+    settings_.haze_distance_m = fresh.haze_distance_m;
+    settings_.haze_scale_height_m = fresh.haze_scale_height_m;
+    settings_.ground_height_m = fresh.ground_height_m;
+    const RendererOptions& o = renderer_options_;
+    if (o.height_slots == plan.height_slots && o.texture_slots == plan.texture_slots &&
+        o.height_offset_m == d.height_offset_m && o.height_quantum_m == d.height_quantum_m)
+        return {};
+    if (arena_) arena_ = std::make_unique<CpuArena>(d, plan.height_slots);
+    if (auto ok = make_renderer(d, plan); !ok) return ok;
+    renderer_->warm_up(settings_, *target_);
+    return {};
 }
 
 void Display::put_height(std::int32_t slot, std::span<const SlotVertex> vertices) {
@@ -80,8 +100,8 @@ void Display::warm_up(const Camera& camera, const DrawItem& tile, std::int64_t t
     DrawItem whole = tile;
     whole.geomip = 0;
     whole.edge_mask = 0;
-    const auto each = static_cast<std::int64_t>(pattern_triangles(tile_cells_log2_, 0, 0));
-    const std::int64_t count = std::clamp<std::int64_t>(triangles / each, 1, max_draws_);
+    const auto each = static_cast<std::int64_t>(pattern_triangles(renderer_options_.lattice.tile_cells_log2, 0, 0));
+    const std::int64_t count = std::clamp<std::int64_t>(triangles / each, 1, renderer_options_.max_draws);
     draw(camera, DrawList(static_cast<std::size_t>(count), whole), 0);
 }
 

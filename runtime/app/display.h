@@ -25,6 +25,7 @@ class Display final : public TileSink {
 public:
     static Result<std::unique_ptr<Display>> create(const Scene& scene, const DisplayOptions& options);
 
+    Result<void> renew(const Dataset& dataset, const MemoryPlan& plan) override;
     void put_height(std::int32_t slot, std::span<const SlotVertex> vertices) override;
     void put_texture(std::int32_t slot, std::span<const std::uint8_t> chain) override;
 
@@ -46,6 +47,7 @@ public:
 
 private:
     Display() = default;
+    Result<void> make_renderer(const Dataset& dataset, const MemoryPlan& plan);
     std::unique_ptr<GlContext> context_;  // goes last
     std::unique_ptr<Renderer> renderer_;
     std::unique_ptr<RenderTarget> target_, inset_;
@@ -53,8 +55,7 @@ private:
     FrameSettings settings_;
     int samples_ = 0;
     std::size_t arena_bytes_ = 0;
-    int max_draws_ = 1;
-    int tile_cells_log2_ = 1;
+    RendererOptions renderer_options_;
 };
 
 /// Haze, sun and ground plane that suit a dataset's size.

@@ -89,9 +89,8 @@ struct FlightLog {
 
 class Flight {
 public:
-    Flight(Scene& scene, Display& display, Ground& ground, const ViewOptions& o, const FlyOptions& f,
-           Clock::time_point context_at)
-        : scene_(scene), display_(display), ground_(ground), options_(o), fly_(f), context_at_(context_at) {}
+    Flight(Scene& scene, Display& display, const ViewOptions& o, const FlyOptions& f, Clock::time_point context_at)
+        : scene_(scene), display_(display), options_(o), fly_(f), context_at_(context_at) {}
 
     Result<FlightLog> fly(const FlightPath& path) {
         if (auto ok = warm_up(); !ok) return ok.error();
@@ -101,6 +100,7 @@ public:
             if (interrupt_flag()) return Error{ErrorCode::interrupted, "stopped"};
             auto camera = camera_of(path[k], options_);
             if (!camera) return camera.error();
+            if (auto ok = scene_.follow(); !ok) return ok.error();
             auto ms = frame(static_cast<int>(k), *camera);
             if (!ms) return ms.error();
             if (fly_.fps > 0) scene_.options().tau_px = governor.next(*ms);
@@ -171,14 +171,23 @@ private:
     Result<void> look_through(const Camera& camera, const SceneFrame& frame) {
         // A promise wider than the picture says nothing of what stands where: the eye may be under a stand-in.
         if (frame.selection->max_bound_px > options_.height_px) return {};
-        ++log_.looked_through;
+        // The ground under the picture: not before an update is taken up, and not after.
+        if (scene_.store().is_rewritten()) return {};
+        if (ground_store_ != scene_.shared_store()) {
+            auto ground = Ground::open(scene_.store());
+            if (!ground) return ground.error();
+            ground_ = std::move(*ground);
+            ground_store_ = scene_.shared_store();
+        }
         FrameSettings& settings = display_.frame_settings();
         settings.magenta_background = true;
         display_.draw(camera, frame.selection->to_render(0), frame.half_curvature);
         settings.magenta_background = false;
-        auto count = count_see_through(ground_, camera, frame.half_curvature, frame.selection->max_bound_px + 1,
+        auto count = count_see_through(*ground_, camera, frame.half_curvature, frame.selection->max_bound_px + 1,
                                        display_.target().read_pixels());
+        if (scene_.store().is_rewritten()) return {};
         if (!count) return count.error();
+        ++log_.looked_through;
         log_.see_through += *count;
         return {};
     }
@@ -198,7 +207,8 @@ private:
 
     Scene& scene_;
     Display& display_;
-    Ground& ground_;
+    std::shared_ptr<const SqliteStore> ground_store_;  // outlives its ground
+    std::unique_ptr<Ground> ground_;
     const ViewOptions& options_;
     const FlyOptions& fly_;
     Clock::time_point context_at_, start_;
@@ -215,7 +225,7 @@ nlohmann::ordered_json loader_report(const LoaderCounters& c) {
 
 nlohmann::ordered_json report_of(const FlightLog& log, const Scene& scene, const ViewOptions& o, const FlyOptions& f,
                                  const std::string& renderer) {
-    const PagerCounters& c = scene.pager().counters();
+    const PagerCounters c = scene.counters();
     const std::int64_t peak = process_usage().peak_rss_bytes;
     nlohmann::ordered_json report = {
         {"frames", log.frame_ms.values.size()},
@@ -224,7 +234,7 @@ nlohmann::ordered_json report_of(const FlightLog& log, const Scene& scene, const
         {"triangles", log.triangles.mean_max()},
         {"tiles_drawn", log.tiles.mean_max()},
         {"budget_bytes", o.budget_bytes},
-        {"peak_resident_bytes", scene.memory().resident_bytes},
+        {"peak_resident_bytes", scene.peak_resident_bytes()},
         {"peak_rss_bytes", peak},
         {"fixed_rss_bytes", log.fixed_rss_bytes},
         {"tile_rss_bytes", peak - log.fixed_rss_bytes},
@@ -233,8 +243,8 @@ nlohmann::ordered_json report_of(const FlightLog& log, const Scene& scene, const
         {"tiles_prefetched", c.prefetched},
         {"requests_refused", c.refused},
         {"bytes_read", c.bytes_read},
-        {"heights_loaded", loader_report(scene.pager().loader_counters(TileKind::height))},
-        {"textures_loaded", loader_report(scene.pager().loader_counters(TileKind::texture))},
+        {"heights_loaded", loader_report(scene.loader_counters(TileKind::height))},
+        {"textures_loaded", loader_report(scene.loader_counters(TileKind::texture))},
         {"frames_with_stand_ins", log.stand_ins},
         {"selections_reused", log.reused},
         {"budget_limited_frames", log.limited},
@@ -244,6 +254,7 @@ nlohmann::ordered_json report_of(const FlightLog& log, const Scene& scene, const
         {"tau_effective_px", log.tau.mean_max()},
         {"cold_start_ms", {{"within_8_px", log.coarse_after_ms}, {"within_tau", log.true_after_ms}}},
         {"damaged_tiles", c.damaged_tiles},
+        {"store_updates", scene.updates()},
         {"tau_px", o.tau_px},
         {"size_px", {o.width_px, o.height_px}},
         {"renderer", renderer}};
@@ -263,16 +274,17 @@ nlohmann::ordered_json report_of(const FlightLog& log, const Scene& scene, const
 
 void print(const FlightLog& log, const Scene& scene, const ViewOptions& o, const FlyOptions& f,
            const std::string& renderer) {
-    const PagerCounters& c = scene.pager().counters();
+    const PagerCounters c = scene.counters();
     fmt::print(
         "{} frames on {}: median {:.1f} ms, p99 {:.1f} ms; selection median {:.3f} ms; {:.0f} triangles in {:.0f} "
         "tiles (mean)\n"
         "promised within {:.3g} px; {} frames with stand-ins, {} holes; {:.1f} of {:.1f} MB for tiles, {} tiles in, {} "
-        "out{}\n",
+        "out{}{}\n",
         log.frame_ms.values.size(), renderer, log.frame_ms.quantile(0.5), log.frame_ms.quantile(0.99),
         log.select_ms.quantile(0.5), log.triangles.mean(), log.tiles.mean(), log.bound.max(), log.stand_ins, log.holes,
-        static_cast<double>(scene.memory().resident_bytes) / 1e6, static_cast<double>(o.budget_bytes) / 1e6,
-        c.tiles_paged_in, c.tiles_paged_out, c.damaged_tiles > 0 ? fmt::format(", {} damaged", c.damaged_tiles) : "");
+        static_cast<double>(scene.peak_resident_bytes()) / 1e6, static_cast<double>(o.budget_bytes) / 1e6,
+        c.tiles_paged_in, c.tiles_paged_out, c.damaged_tiles > 0 ? fmt::format(", {} damaged", c.damaged_tiles) : "",
+        scene.updates() > 0 ? fmt::format("; the store was updated {} times", scene.updates()) : "");
     if (log.limited > 0)
         fmt::print("the budget bound in {} frames: tau {:.2f} px at most\n", log.limited, log.tau.max());
     if (f.settled)
@@ -296,12 +308,11 @@ Result<void> run(const ViewOptions& o, const FlyOptions& f) {
     if (!store) return store.error();
     SceneOptions options = scene_options(o);
     options.latency_ms = f.latency_ms;
+    options.follow = true;
     auto scene = Scene::open(**store, options);
     if (!scene) return scene.error();
     auto path = path_of(**store, o, f);
     if (!path) return path.error();
-    auto ground = Ground::open(**store);
-    if (!ground) return ground.error();
     DisplayOptions display_options{o.width_px, o.height_px};
     display_options.window = !f.headless;
     auto display = Display::create(**scene, display_options);
@@ -309,7 +320,7 @@ Result<void> run(const ViewOptions& o, const FlyOptions& f) {
     const auto context_at = Clock::now();
     (*display)->frame_settings().wait_until_drawn = true;
     if (auto ok = (*scene)->start(**display); !ok) return ok;
-    auto log = Flight(**scene, **display, **ground, o, f, context_at).fly(*path);
+    auto log = Flight(**scene, **display, o, f, context_at).fly(*path);
     if (!log) return log.error();
     if (!f.csv.empty())
         if (auto ok = write_text(f.csv, log->csv); !ok) return ok;

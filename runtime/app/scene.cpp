@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cassert>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -32,6 +33,9 @@ Box box_of(const Dataset& d, TileId id, glm::dvec3 eye, double half_curvature) {
     return box;
 }
 
+constexpr int kOpenings = 10;             // of a store that is updated again and again
+constexpr double kLongestTakeover_s = 2;  // with its roots there
+
 constexpr double kMotionFades_s = 0.4;
 constexpr double kStill_m = 1e-3;
 
@@ -45,22 +49,159 @@ bool same_view(const Camera& a, const Camera& b) {
 
 }  // namespace
 
-Scene::Scene(const SqliteStore& store, const SceneOptions& options, const MemoryPlan& memory)
-    : store_(store), options_(options), memory_(memory), selector_(store.dataset()), ahead_(store.dataset()) {}
+Scene::Scene(std::shared_ptr<const SqliteStore> store, const SceneOptions& options, const MemoryPlan& memory)
+    : store_(std::move(store)), options_(options), memory_(memory), peak_resident_bytes_(memory.resident_bytes) {
+    make_selectors();
+}
 
-Result<std::unique_ptr<Scene>> Scene::open(const SqliteStore& store, const SceneOptions& options) {
-    auto memory = plan_memory(store.dataset(), options.budget_bytes);
+Scene::~Scene() = default;
+
+Result<std::unique_ptr<Scene>> Scene::open(std::shared_ptr<const SqliteStore> store, const SceneOptions& options) {
+    auto memory = plan_memory(store->dataset(), options.budget_bytes);
     if (!memory) return memory.error();
-    return std::unique_ptr<Scene>(new Scene(store, options, *memory));
+    return std::unique_ptr<Scene>(new Scene(std::move(store), options, *memory));
+}
+
+void Scene::make_selectors() {
+    forget_selections();
+    selector_ = std::make_unique<Selector>(dataset());
+    ahead_ = std::make_unique<Selector>(dataset());
+}
+
+void Scene::forget_selections() {
+    last_ = {};
+    foreseen_ = nullptr;
+    foreseen_requests_.clear();
 }
 
 Result<void> Scene::start(TileSink& sink) {
-    auto pager =
-        Pager::create(store_, {memory_, options_.loader_threads, options_.latency_ms, options_.textures}, sink);
-    if (!pager) return pager.error();
-    pager_ = std::move(*pager);
-    pager_->on_damage = [path = store_.path()](const std::string& what) { note("{}: {}\n", path, what); };
+    sink_ = &sink;
+    if (auto ok = make_pager(); !ok) return ok;
+    if (options_.follow) watch_ = std::make_unique<StoreWatch>(store_, std::max(options_.loader_threads, 1));
     return {};
+}
+
+// A store is drawn as it was at one moment: where an update comes in between, it is opened once more.
+Result<void> Scene::make_pager() {
+    for (int tries = 1;; ++tries) {
+        auto pager =
+            Pager::create(store_, {memory_, options_.loader_threads, options_.latency_ms, options_.textures}, *sink_);
+        if (pager) {
+            pager_ = std::move(*pager);
+            pager_->on_damage = [path = store_->path()](const std::string& what) { note("{}: {}\n", path, what); };
+            return {};
+        }
+        if (!options_.follow || tries == kOpenings || !store_->has_changed()) return pager.error();
+        auto opened = SqliteStore::open(store_->path());
+        if (!opened) return opened.error();
+        if (auto ok = use_store(std::move(*opened)); !ok) return ok;
+    }
+}
+
+// Divides memory anew. No tile is resident.
+Result<void> Scene::use_store(std::shared_ptr<const SqliteStore> store) {
+    if (auto ok = expect_same_place(*store); !ok) return ok;
+    auto plan = plan_memory(store->dataset(), options_.budget_bytes);
+    if (!plan) return plan.error();
+    store_ = std::move(store);
+    memory_ = *plan;
+    peak_resident_bytes_ = std::max(peak_resident_bytes_, memory_.resident_bytes);
+    make_selectors();
+    return sink_->renew(dataset(), memory_);
+}
+
+// Eye and path are in the coordinates of the store that was opened first.
+Result<void> Scene::expect_same_place(const SqliteStore& next) const {
+    const Dataset &a = dataset(), &b = next.dataset();
+    if (a.lattice == b.lattice && a.crs == b.crs && a.vertical_datum == b.vertical_datum) return {};
+    return Error{ErrorCode::store,
+                 fmt::format("{}: another store has taken its place, with another {}; start again to see it",
+                             store_->path(), a.lattice == b.lattice ? "coordinate system" : "lattice")};
+}
+
+// Slots hold integers of the one quantum, and a fresh start would divide memory as it is divided, or has room for all
+// tiles, as there is here: then the settled picture is that of a fresh start.
+bool Scene::fits_in_place(const Dataset& next) const {
+    const Dataset& now = dataset();
+    if (next.height_offset_m != now.height_offset_m || next.height_quantum_m != now.height_quantum_m ||
+        next.texture_size_log2 != now.texture_size_log2)
+        return false;
+    const auto plan = plan_memory(next, options_.budget_bytes);
+    if (!plan) return false;
+    if (plan->height_slots == memory_.height_slots && plan->texture_slots == memory_.texture_slots) return true;
+    const auto holds_all = [&](const MemoryPlan& m) {
+        return m.height_slots >= next.height_tiles && m.texture_slots >= next.texture_tiles;
+    };
+    return holds_all(*plan) && holds_all(memory_);
+}
+
+Result<void> Scene::follow() {
+    if (!watch_) return {};
+    if (auto trouble = watch_->take_trouble()) {
+        trouble_ = std::move(*trouble);
+        note("{}; drawing what was there before\n", trouble_);
+    }
+    auto opened = watch_->take();
+    if (!opened) return {};
+    trouble_.clear();
+    return take_up(std::move(*opened));
+}
+
+Result<void> Scene::take_up(OpenedStore opened) {
+    if (auto ok = expect_same_place(*opened.store); !ok) return ok;
+    forget_selections();
+    if (!fits_in_place(opened.store->dataset())) return start_over(std::move(opened.store));
+    coming_ = opened.store;
+    coming_selector_ = std::make_unique<Selector>(coming_->dataset());
+    roots_since_s_.reset();
+    pager_->begin_takeover({coming_, std::move(opened.readers)});
+    return {};
+}
+
+Result<void> Scene::start_over(std::shared_ptr<const SqliteStore> store) {
+    earlier_ = counters();
+    for (const TileKind kind : {TileKind::height, TileKind::texture})
+        earlier_loads_[static_cast<std::size_t>(kind)] = loader_counters(kind);
+    pager_.reset();  // never the memory of two
+    if (auto ok = use_store(std::move(store)); !ok) return ok;
+    if (auto ok = make_pager(); !ok) return ok;
+    ++updates_;
+    return {};
+}
+
+void Scene::switch_over() {
+    pager_->switch_over();
+    store_ = std::move(coming_);
+    selector_ = std::move(coming_selector_);
+    ahead_ = std::make_unique<Selector>(dataset());
+    forget_selections();
+    ++updates_;
+    // Nothing to divide anew, so nothing that could fail.
+    [[maybe_unused]] const auto ok = sink_->renew(dataset(), memory_);
+    assert(ok);
+}
+
+PagerCounters Scene::counters() const {
+    PagerCounters c = earlier_;
+    if (!pager_) return c;
+    const PagerCounters& now = pager_->counters();
+    c.tiles_paged_in += now.tiles_paged_in;
+    c.tiles_paged_out += now.tiles_paged_out;
+    c.bytes_read += now.bytes_read;
+    c.damaged_tiles += now.damaged_tiles;
+    c.refused += now.refused;
+    c.prefetched += now.prefetched;
+    return c;
+}
+
+LoaderCounters Scene::loader_counters(TileKind kind) const {
+    LoaderCounters c = earlier_loads_[static_cast<std::size_t>(kind)];
+    if (!pager_) return c;
+    const LoaderCounters now = pager_->loader_counters(kind);
+    c.tiles += now.tiles;
+    c.cpu_seconds += now.cpu_seconds;
+    c.latency_seconds += now.latency_seconds;
+    return c;
 }
 
 SelectionSettings Scene::selection_settings(double half_curvature, double growth_s) const {
@@ -96,7 +237,7 @@ bool Scene::look_ahead(std::span<const Camera> views, SelectionSettings settings
     const double zoom = wide.focal_px() / ahead.focal_px();
     settings.tau_px *= zoom * wide.off_axis_factor() / ahead.off_axis_factor();
     settings.texture_tau_px *= zoom;
-    const Selection& future = ahead_.select({&wide, 1}, settings, pager_->residency());
+    const Selection& future = ahead_->select({&wide, 1}, settings, pager_->residency());
     // A future that does not fit is no help to the present.
     if (future.budget_limited) return false;
     foreseen_ = &future;
@@ -139,11 +280,54 @@ bool Scene::nothing_changed(std::span<const Camera> views, const SelectionSettin
            std::equal(views.begin(), views.end(), last_views_.begin(), last_views_.end(), same_view);
 }
 
+double Scene::curvature_of(const Dataset& dataset, std::span<const Camera> views) const {
+    double most = 0;
+    for (const Camera& view : views) most = std::max(most, half_curvature(options_.curvature, dataset, view));
+    return most;
+}
+
+// Both states of the store plan with half of the slots: what does not fit is somewhat coarser for a moment, and neither
+// is left without. True: the new one is as good as the old, and has taken its place.
+bool Scene::think_of_both(std::span<const Camera> views, double growth_s, SceneFrame& frame) {
+    frame.half_curvature = curvature_of(dataset(), views);
+    SelectionSettings settings = selection_settings(frame.half_curvature, growth_s);
+    settings.height_slots /= 2;
+    settings.texture_slots /= 2;
+    const Selection& shown = selector_->select(views, settings, pager_->residency());
+    Pager::Wishes coming_wishes;
+    if (pager_->roots_ready()) {
+        if (!roots_since_s_) roots_since_s_ = pager_->residency().now_s;
+        settings.growth_s = 0;
+        settings.half_curvature = curvature_of(coming_->dataset(), views);
+        const Selection& coming = coming_selector_->select(views, settings, pager_->coming());
+        const bool as_good =
+            coming.max_bound_px <= shown.max_bound_px && coming.requests.size() <= shown.requests.size();
+        // An eye that moves fast may never see all of it.
+        const bool late = !pager_->stale() && pager_->residency().now_s > *roots_since_s_ + kLongestTakeover_s;
+        if (coming.complete || as_good || late) {
+            switch_over();
+            return true;
+        }
+        coming_wishes = {coming.planned_heights, coming.planned_textures, coming.standing_heights,
+                         coming.standing_textures, coming.requests};
+    }
+    pager_->request(
+        {shown.planned_heights, shown.planned_textures, shown.standing_heights, shown.standing_textures, {}},
+        coming_wishes);
+    frame.selection = &shown;
+    frame.stand_ins = !shown.complete;
+    frame.taking_over = true;
+    return false;
+}
+
 SceneFrame Scene::think(std::span<const Camera> views, double growth_s) {
     const double start_s = thread_cpu_seconds();
     SceneFrame frame;
-    for (const Camera& view : views)
-        frame.half_curvature = std::max(frame.half_curvature, half_curvature(options_.curvature, dataset(), view));
+    if (pager_->taking_over() && !think_of_both(views, growth_s, frame)) {
+        frame.select_ms = 1e3 * (thread_cpu_seconds() - start_s);
+        return frame;
+    }
+    frame.half_curvature = curvature_of(dataset(), views);
     SelectionSettings settings = selection_settings(frame.half_curvature, growth_s);
     if (nothing_changed(views, settings)) {
         frame = last_;
@@ -153,7 +337,7 @@ SceneFrame Scene::think(std::span<const Camera> views, double growth_s) {
         return frame;
     }
     last_settings_ = settings;
-    const Selection& now = selector_.select(views, settings, pager_->residency());
+    const Selection& now = selector_->select(views, settings, pager_->residency());
     settings.growth_s = 0;
     bool fresh = false;
     if (growth_s > 0 && options_.foresight_s > 0 && !views.empty() && !now.budget_limited)
@@ -176,7 +360,7 @@ SceneFrame Scene::think(std::span<const Camera> views, double growth_s) {
 // Takes what arrives and chooses anew, until nothing is missing or so much time has passed.
 SceneFrame Scene::think_again(std::span<const Camera> views, double growth_s, SceneFrame frame, double seconds) {
     const auto start = std::chrono::steady_clock::now();
-    while (frame.stand_ins && !pager_->idle() &&
+    while (frame.stand_ins && !frame.taking_over && !pager_->idle() &&
            std::chrono::steady_clock::now() - start < std::chrono::duration<double>(seconds)) {
         // To wait for an arrival would be to wait as long as a slow disk likes.
         std::this_thread::sleep_for(kLook);
@@ -209,9 +393,36 @@ SceneFrame Scene::catch_up(std::span<const Camera> views, double now_s, double s
     return frame;
 }
 
+// A step towards what an update has made of the store, while nothing is drawn. True: it has been taken up.
+Result<bool> Scene::step_to_update() {
+    if (!watch_) return Error{ErrorCode::io, fmt::format("{}: was changed while it was drawn", store_->path())};
+    const std::int64_t before = updates_;
+    if (auto ok = follow(); !ok) return ok.error();
+    if (updates_ != before) return true;
+    if (pager_->stale()) {
+        if (!trouble_.empty()) return Error{ErrorCode::store, trouble_};
+        if (pager_->gave_up())
+            return Error{ErrorCode::store, fmt::format("{}: an update left a damaged root tile", store_->path())};
+        pager_->take_arrivals(std::numeric_limits<std::int64_t>::max(), false);
+        std::this_thread::sleep_for(kLook);
+        return false;
+    }
+    pager_->request({}, {});
+    pager_->take_arrivals(std::numeric_limits<std::int64_t>::max(), true);
+    if (!pager_->roots_ready()) return false;
+    switch_over();
+    return true;
+}
+
 Result<SceneFrame> Scene::complete(std::span<const Camera> views, const std::function<bool()>& stop) {
     std::int64_t uploads = 0;
     for (int idle_rounds = 0; idle_rounds < 3;) {
+        while (pager_->taking_over() || pager_->stale()) {
+            if (stop && stop()) return Error{ErrorCode::interrupted, "stopped"};
+            auto taken_up = step_to_update();
+            if (!taken_up) return taken_up.error();
+            if (*taken_up) idle_rounds = 0;
+        }
         SceneFrame frame = think(views, 0);
         frame.uploads = uploads;
         if (!frame.stand_ins) return frame;
@@ -220,7 +431,7 @@ Result<SceneFrame> Scene::complete(std::span<const Camera> views, const std::fun
         uploads += taken;
         idle_rounds = taken == 0 ? idle_rounds + 1 : 0;
     }
-    return Error{ErrorCode::store, fmt::format("{}: tiles that are needed never became resident", store_.path())};
+    return Error{ErrorCode::store, fmt::format("{}: tiles that are needed never became resident", store_->path())};
 }
 
 }  // namespace scree

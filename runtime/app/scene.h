@@ -2,13 +2,16 @@
 // OpenGL: the sink decides where tiles go. Frame-loop thread only.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 
 #include "common/store/sqlite_store.h"
+#include "runtime/app/store_watch.h"
 #include "runtime/lod/selection.h"
 #include "runtime/paging/pager.h"
 #include "runtime/view/curvature.h"
@@ -27,6 +30,7 @@ struct SceneOptions {
     int loader_threads = 2;
     int latency_ms = 0;
     bool textures = true;
+    bool follow = false;  ///< take up what updates make of the store; else a changed store is an error of complete()
     std::int64_t upload_bytes_per_frame = 4 << 20;  ///< about 90 textures; larger arrives sooner and may hitch
 };
 
@@ -36,22 +40,41 @@ struct SceneFrame {
     double half_curvature = 0;
     double select_ms = 0;  ///< selection and requests, CPU time of the thread
     std::int64_t uploads = 0;
-    bool stand_ins = false;  ///< drawn coarser than full residency would
-    bool reused = false;     ///< nothing had changed: the last frame's selection, not chosen again
+    bool stand_ins = false;    ///< drawn coarser than full residency would
+    bool taking_over = false;  ///< an update of the store is being loaded; what is drawn is still what was before
+    bool reused = false;       ///< nothing had changed: the last frame's selection, not chosen again
 };
 
 class Scene {
 public:
-    static Result<std::unique_ptr<Scene>> open(const SqliteStore& store, const SceneOptions& options);
+    static Result<std::unique_ptr<Scene>> open(std::shared_ptr<const SqliteStore> store, const SceneOptions& options);
+    /// `store` outlives the scene.
+    static Result<std::unique_ptr<Scene>> open(const SqliteStore& store, const SceneOptions& options) {
+        return open(std::shared_ptr<const SqliteStore>(std::shared_ptr<void>(), &store), options);
+    }
+    ~Scene();
     /// Makes the pager with its sink (the sink's slots are sized by memory()).
     Result<void> start(TileSink& sink);
 
-    const Dataset& dataset() const { return store_.dataset(); }
-    const TileStore& store() const { return store_; }
+    /// Of the state of the store that is drawn. An update may replace it in any of the calls below.
+    const Dataset& dataset() const { return store_->dataset(); }
+    const TileStore& store() const { return *store_; }
+    std::shared_ptr<const SqliteStore> shared_store() const { return store_; }
+    /// Updates taken up: of which what is drawn is the last.
+    std::int64_t updates() const { return updates_; }
     const MemoryPlan& memory() const { return memory_; }
+    /// Greatest of memory().resident_bytes so far.
+    std::int64_t peak_resident_bytes() const { return peak_resident_bytes_; }
+    /// Of all the flight, whatever was taken up.
+    PagerCounters counters() const;
+    LoaderCounters loader_counters(TileKind kind) const;
     const Pager& pager() const { return *pager_; }
     SceneOptions& options() { return options_; }
 
+    /// Once a frame, where options.follow is set: takes up what an update has made of the store. It is loaded beside
+    /// what is drawn, and drawn once it is as complete. Waits for nothing, unless memory must be divided anew, which
+    /// costs a frame. Errors: ErrorCode::store where another store has taken the place of this one; those of start().
+    Result<void> follow();
     /// One frame's arrivals, selection and requests at `now_s`, a clock that only has to move forward. While tiles are
     /// missing it may look again for `patience_s`: what is a small part of a long frame fills the gaps of the picture.
     /// The selection is valid until the next call.
@@ -59,11 +82,25 @@ public:
     /// The first pictures: looks again until nothing is missing or `seconds` have passed, and what comes meanwhile has
     /// nothing to grow out of.
     SceneFrame catch_up(std::span<const Camera> views, double now_s, double seconds);
-    /// The same until nothing is missing, and nothing grows. Errors: ErrorCode::store if what is missing never comes.
+    /// The same until nothing is missing, and nothing grows. An update that is under way is waited for. Errors:
+    /// ErrorCode::store if what is missing never comes, those of follow(); ErrorCode::io where the store was changed
+    /// and is not followed.
     Result<SceneFrame> complete(std::span<const Camera> views, const std::function<bool()>& stop = {});
 
 private:
-    Scene(const SqliteStore& store, const SceneOptions& options, const MemoryPlan& memory);
+    Scene(std::shared_ptr<const SqliteStore> store, const SceneOptions& options, const MemoryPlan& memory);
+    void make_selectors();
+    void forget_selections();
+    Result<void> make_pager();
+    Result<void> use_store(std::shared_ptr<const SqliteStore> store);
+    Result<void> expect_same_place(const SqliteStore& next) const;
+    bool fits_in_place(const Dataset& next) const;
+    Result<void> take_up(OpenedStore opened);
+    Result<void> start_over(std::shared_ptr<const SqliteStore> store);
+    void switch_over();
+    Result<bool> step_to_update();
+    bool think_of_both(std::span<const Camera> views, double growth_s, SceneFrame& frame);
+    double curvature_of(const Dataset& dataset, std::span<const Camera> views) const;
     void note_motion(std::span<const Camera> views, double now_s);
     SceneFrame think(std::span<const Camera> views, double growth_s);
     bool nothing_changed(std::span<const Camera> views, const SelectionSettings& settings) const;
@@ -72,12 +109,23 @@ private:
     bool look_ahead(std::span<const Camera> views, SelectionSettings settings);
     Pager::Wishes with_foreseen(const Pager::Wishes& now, bool fresh);
 
-    const SqliteStore& store_;
+    std::shared_ptr<const SqliteStore> store_;
     SceneOptions options_;
     MemoryPlan memory_;
+    TileSink* sink_ = nullptr;
     std::unique_ptr<Pager> pager_;
-    Selector selector_;
-    Selector ahead_;
+    std::unique_ptr<Selector> selector_, ahead_;
+    std::unique_ptr<StoreWatch> watch_;
+    /// What is being taken up.
+    std::shared_ptr<const SqliteStore> coming_;
+    std::unique_ptr<Selector> coming_selector_;
+    std::optional<double> roots_since_s_;  ///< when its roots had come
+    std::string trouble_;                  ///< why the store cannot be opened
+    std::int64_t updates_ = 0;
+    // Of pagers that are gone.
+    PagerCounters earlier_;
+    std::array<LoaderCounters, 2> earlier_loads_;
+    std::int64_t peak_resident_bytes_;
     Foresight foresight_;
     const Selection* foreseen_ = nullptr;  ///< of the last look ahead; null: none
     std::vector<std::int32_t> standing_heights_, standing_textures_;

@@ -28,9 +28,10 @@ Result<void> shoot(const ViewOptions& o, const std::optional<FlightPose>& asked,
                    const std::string& mesh_file, const FrameSettings& debug) {
     auto store = SqliteStore::open(o.store);
     if (!store) return store.error();
-    auto scene = Scene::open(**store, scene_options(o));
+    SceneOptions options = scene_options(o);
+    options.follow = true;  // a picture of one state, whatever happens meanwhile
+    auto scene = Scene::open(std::move(*store), options);
     if (!scene) return scene.error();
-    const Dataset& d = (*store)->dataset();
     DisplayOptions display_options{o.width_px, o.height_px};
     display_options.keep_heights = !mesh_file.empty();
     auto display = Display::create(**scene, display_options);
@@ -39,7 +40,8 @@ Result<void> shoot(const ViewOptions& o, const std::optional<FlightPose>& asked,
     (*display)->frame_settings().colour_by_level = debug.colour_by_level;
     (*display)->frame_settings().magenta_background = debug.magenta_background;
     if (auto ok = (*scene)->start(**display); !ok) return ok;
-    const FlightPose pose = asked.value_or(overview(d, o.fov_deg, static_cast<double>(o.width_px) / o.height_px));
+    const FlightPose pose =
+        asked.value_or(overview((*scene)->dataset(), o.fov_deg, static_cast<double>(o.width_px) / o.height_px));
     auto camera = camera_of(pose, o);
     if (!camera) return camera.error();
     auto frame = (*scene)->complete({&*camera, 1}, [] { return interrupt_flag().load(); });
@@ -49,6 +51,7 @@ Result<void> shoot(const ViewOptions& o, const std::optional<FlightPose>& asked,
     const auto pixels = (*display)->target().read_pixels();
     if (auto ok = write_png(out, o.width_px, o.height_px, pixels); !ok) return ok;
     if (!mesh_file.empty()) {
+        const Dataset& d = (*scene)->dataset();
         const TilePatterns patterns(d.lattice.tile_cells_log2);
         const DrawnMesh mesh = drawn_mesh(d, patterns, selection.draws[0], *(*display)->arena());
         if (auto ok = write_ply(mesh_file, d, mesh, camera->eye, frame->half_curvature); !ok) return ok;

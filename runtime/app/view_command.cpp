@@ -5,12 +5,12 @@
 #include <cmath>
 #include <filesystem>
 
-#include "common/query/ground.h"
 #include "common/report.h"
 #include "runtime/app/commands.h"
 #include "runtime/app/display.h"
 #include "runtime/app/fly_controls.h"
 #include "runtime/app/frame_governor.h"
+#include "runtime/app/ground_probe.h"
 #include "runtime/app/hud.h"
 #include "runtime/app/view_options.h"
 
@@ -24,12 +24,13 @@ HudLines status_lines(const Scene& scene, const SceneFrame& frame, const FlightP
     HudLines lines;
     lines.title = fmt::format("{:.0f} fps   {} triangles in {} tiles", fps, s.triangles, s.nodes);
     lines.body = fmt::format(
-        "within {:.2f} px{}{}\neye {:.0f}, {:.0f}, {:.0f} m   {:.0f} m/s\n\nW A S D Q E fly, drag to look, wheel: "
+        "within {:.2f} px{}{}{}\neye {:.0f}, {:.0f}, {:.0f} m   {:.0f} m/s\n\nW A S D Q E fly, drag to look, wheel: "
         "speed, Shift: faster\n"
         "[ ] accuracy   F wireframe   L levels   V second view   H hide   Home   Esc",
         s.max_bound_px, frame.stand_ins ? fmt::format(", loading {}", s.requests.size()) : "",
-        s.budget_limited ? fmt::format(", the budget allows {:.1f} px", s.tau_effective_px) : "", pose.eye.x,
-        pose.eye.y, pose.eye.z, speed);
+        s.budget_limited ? fmt::format(", the budget allows {:.1f} px", s.tau_effective_px) : "",
+        scene.updates() > 0 ? fmt::format(", update {}", scene.updates()) : "", pose.eye.x, pose.eye.y, pose.eye.z,
+        speed);
     lines.credit = scene.dataset().attribution;
     return lines;
 }
@@ -67,19 +68,20 @@ struct WindowSettings {
 Result<void> view(ViewOptions o, const WindowSettings& w) {
     auto store = SqliteStore::open(o.store);
     if (!store) return store.error();
-    auto scene = Scene::open(**store, scene_options(o));
+    SceneOptions options = scene_options(o);
+    options.follow = true;
+    auto scene = Scene::open(std::move(*store), options);
     if (!scene) return scene.error();
-    const Dataset& d = (*store)->dataset();
     DisplayOptions display_options{o.width_px, o.height_px};
     display_options.window = true;
     display_options.wait_for_refresh = true;
     auto display = Display::create(**scene, display_options);
     if (!display) return display.error();
     if (auto ok = (*scene)->start(**display); !ok) return ok;
-    auto ground = Ground::open(**store);
-    if (!ground) return ground.error();
+    GroundProbe ground((*scene)->shared_store());
     GLFWwindow* window = (*display)->context().window();
     glfwSetWindowTitle(window, fmt::format("Scree - {}", std::filesystem::path(o.store).filename().string()).c_str());
+    const Dataset& d = (*scene)->dataset();
     const double extent = static_cast<double>(std::max(d.lattice.cells_x, d.lattice.cells_y)) * d.lattice.spacing_m;
     FlyControls controls(window, overview(d, o.fov_deg, static_cast<double>(o.width_px) / o.height_px), extent);
     Hud hud(window);
@@ -87,6 +89,7 @@ Result<void> view(ViewOptions o, const WindowSettings& w) {
     FrameGovernor governor({w.fps > 0 ? 1000 / w.fps : 1e9, o.tau_px, w.tau_most_px});
     double wanted_tau_px = o.tau_px;
     std::pair<int, int> second_size;
+    std::int64_t updates = 0;
     double mean_frame_s = 0;  // over frames that were drawn
     const auto start = Clock::now();
     auto last = start;
@@ -107,9 +110,9 @@ Result<void> view(ViewOptions o, const WindowSettings& w) {
             second_size = {};
             redraw = true;
         }
+        if (auto ok = (*scene)->follow(); !ok) return ok;
         const FlightPose before = controls.pose();
-        auto under = (*ground)->height(before.eye.x, before.eye.y);
-        const double ground_m = under && *under ? (*under)->height_m : -1e9;
+        const double ground_m = ground.height_m(before.eye.x, before.eye.y).value_or(-1e9);
         controls.move(std::min(elapsed, 0.1), ground_m);
         FrameSettings& settings = (*display)->frame_settings();
         const auto toggle = [&](int key, bool& value) {
@@ -140,15 +143,23 @@ Result<void> view(ViewOptions o, const WindowSettings& w) {
                 if (auto ok = (*display)->resize_inset(inset_width, inset_height); !ok) return ok;
                 second_size = {inset_width, inset_height};
             }
-            auto above = view_from_above(*camera, d, std::max(ground_m, d.min_height_m), inset_width, inset_height);
+            const Dataset& shown = (*scene)->dataset();
+            auto above =
+                view_from_above(*camera, shown, std::max(ground_m, shown.min_height_m), inset_width, inset_height);
             if (!above) return above.error();
             views.push_back(*above);
         }
         const SceneFrame frame = first ? (*scene)->catch_up(views, now_s, kCatchUp_s)
                                        : (*scene)->advance(views, now_s, kPatience * mean_frame_s);
         first = false;
+        if ((*scene)->updates() != updates) {
+            updates = (*scene)->updates();
+            ground.use((*scene)->shared_store());
+            redraw = true;
+        }
         if (!redraw && !controls.moved() && !frame.stand_ins && frame.uploads == 0) {
-            glfwWaitEventsTimeout(0.1);  // nothing changes: leave the core alone
+            // Nothing changes: leave the core alone.
+            glfwWaitEventsTimeout(frame.taking_over ? 0.01 : 0.1);
             continue;
         }
         redraw = frame.stand_ins || frame.selection->growing;

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <condition_variable>
+#include <optional>
 #include <thread>
 
 #include "common/store/height_codec.h"
@@ -35,13 +37,22 @@ bool more_urgent(const LoadJob& a, const LoadJob& b) {
 // What one thread reads and decodes with.
 class TileLoading {
 public:
-    TileLoading(const Dataset& dataset, std::unique_ptr<TileReader> reader)
-        : dataset_(dataset), reader_(std::move(reader)) {}
+    TileLoading(std::shared_ptr<const TileStore> store, std::unique_ptr<TileReader> reader)
+        : store_(std::move(store)), reader_(std::move(reader)) {}
 
     void load(LoadedTile& tile) {
         tile.error.clear();
         tile.missing = false;
         tile.bytes_read = 0;
+        read(tile);
+        // Asked afterwards: a writer cannot have begun before the read ended without being seen now.
+        tile.stale = store_->is_rewritten();
+    }
+
+private:
+    const Dataset& dataset() const { return store_->dataset(); }
+
+    void read(LoadedTile& tile) {
         auto found = reader_->read(tile.job.kind, tile.job.id, row_);
         if (!found) {
             tile.error = found.error().message;
@@ -57,9 +68,8 @@ public:
         if (!ok) tile.error = ok.error().message;
     }
 
-private:
     Result<void> decode_height(LoadedTile& tile) {
-        const int n = dataset_.lattice.tile_cells_log2;
+        const int n = dataset().lattice.tile_cells_log2;
         if (auto ok = decode_height_tile(row_.payload, n, row_.codec, height_); !ok) return ok;
         tile.header = height_.header;
         tile.vertices.resize(slot_vertex_count(n));
@@ -70,13 +80,13 @@ private:
     // Straight into the staged tile's buffer, which the texture borrows meanwhile.
     Result<void> decode_texture(LoadedTile& tile) {
         texture_.blocks.swap(tile.blocks);
-        auto ok = decode_texture_tile(row_.payload, dataset_.texture_size_log2, row_.codec, texture_);
+        auto ok = decode_texture_tile(row_.payload, dataset().texture_size_log2, row_.codec, texture_);
         texture_.blocks.swap(tile.blocks);
         tile.header.child_mask = texture_.child_mask;
         return ok;
     }
 
-    const Dataset& dataset_;
+    std::shared_ptr<const TileStore> store_;
     std::unique_ptr<TileReader> reader_;
     TileRow row_;
     HeightTile height_;
@@ -86,7 +96,6 @@ private:
 }  // namespace
 
 struct Loader::Impl {
-    const TileStore& store;
     int latency_ms = 0;
     mutable std::mutex mutex;
     std::condition_variable work_ready, tile_ready, stop;
@@ -96,9 +105,9 @@ struct Loader::Impl {
     std::vector<LoadedTile*> being_read, finished;
     std::array<LoaderCounters, 2> counters;
     bool stopping = false;
+    std::int64_t generation = 0;
+    std::vector<TileLoading> fresh;  // of this generation, one for each thread that has not taken its own yet
     std::vector<std::thread> threads;
-
-    explicit Impl(const TileStore& s) : store(s) {}
 
     LoadedTile* begin_job() {
         auto& buffers = spare[index_of(queue.back().kind)];
@@ -112,6 +121,7 @@ struct Loader::Impl {
         LoadedTile* tile = buffers.back();
         buffers.pop_back();
         tile->job = queue.back();
+        tile->job.generation = generation;
         queue.pop_back();
         being_read.push_back(tile);
         return tile;
@@ -128,6 +138,7 @@ struct Loader::Impl {
 
     void run(TileLoading loading) {
         std::unique_lock lock(mutex);
+        std::int64_t reads_from = 0;
         for (;;) {
             work_ready.wait(lock, [&] { return stopping || !queue.empty(); });
             if (stopping) return;
@@ -135,8 +146,20 @@ struct Loader::Impl {
             LoadedTile* tile = begin_job();
             if (latency_ms > 0 && stop.wait_for(lock, std::chrono::milliseconds(latency_ms), [&] { return stopping; }))
                 return;
+            std::optional<TileLoading> next;
+            if (reads_from != tile->job.generation && tile->job.generation == generation) {
+                next.emplace(std::move(fresh.back()));
+                fresh.pop_back();
+                reads_from = generation;
+            }
+            // A second renewal during the delay: this thread's reader was never taken, and the job is nobody's.
+            const bool too_late = reads_from != tile->job.generation;
             lock.unlock();
-            loading.load(*tile);
+            if (next) loading = std::move(*next);
+            if (too_late)
+                tile->stale = true;
+            else
+                loading.load(*tile);
             lock.lock();
             end_job(tile, thread_cpu_seconds() - start);
             tile_ready.notify_one();
@@ -146,15 +169,15 @@ struct Loader::Impl {
 
 Loader::Loader(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
-Result<std::unique_ptr<Loader>> Loader::start(const TileStore& store, int threads, int latency_ms) {
-    auto impl = std::make_unique<Impl>(store);
+Result<std::unique_ptr<Loader>> Loader::start(std::shared_ptr<const TileStore> store, int threads, int latency_ms) {
+    auto impl = std::make_unique<Impl>();
     impl->latency_ms = latency_ms;
     std::unique_ptr<Loader> loader(new Loader(std::move(impl)));
     for (int t = 0; t < std::max(threads, 1); ++t) {
-        auto reader = store.open_reader();
+        auto reader = store->open_reader();
         if (!reader) return reader.error();
         loader->impl_->threads.emplace_back(
-            [state = loader->impl_.get(), loading = TileLoading(store.dataset(), std::move(*reader))]() mutable {
+            [state = loader->impl_.get(), loading = TileLoading(store, std::move(*reader))]() mutable {
                 state->run(std::move(loading));
             });
     }
@@ -169,6 +192,22 @@ Loader::~Loader() {
     impl_->work_ready.notify_all();
     impl_->stop.notify_all();
     for (std::thread& thread : impl_->threads) thread.join();
+}
+
+void Loader::renew(std::shared_ptr<const TileStore> store, Readers readers) {
+    std::vector<TileLoading> fresh, unused;
+    for (auto& reader : readers) fresh.emplace_back(store, std::move(reader));
+    const std::lock_guard lock(impl_->mutex);
+    assert(fresh.size() >= impl_->threads.size());
+    impl_->queue.clear();
+    ++impl_->generation;
+    unused.swap(impl_->fresh);
+    impl_->fresh.swap(fresh);
+}
+
+std::int64_t Loader::generation() const {
+    const std::lock_guard lock(impl_->mutex);
+    return impl_->generation;
 }
 
 Loader::QueueEdit::QueueEdit(Loader& loader) : loader_(loader), lock_(loader.impl_->mutex) {}

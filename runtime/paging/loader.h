@@ -22,6 +22,7 @@ struct LoadJob {
     double priority = 0;
     bool prefetch = false;
     std::int64_t order = 0;                             ///< among jobs of one priority, the smallest goes first
+    std::int64_t generation = 0;                        ///< of the store's states, set by the loader
     std::chrono::steady_clock::time_point queued_at{};  ///< set by the loader
 };
 
@@ -29,6 +30,7 @@ struct LoadedTile {
     LoadJob job;
     std::string error;     ///< empty: loaded
     bool missing = false;  ///< there is no such tile: an error too
+    bool stale = false;    ///< the store was rewritten meanwhile: neither the tile nor its error means anything
     HeightTileHeader header;
     std::vector<SlotVertex> vertices;  ///< height tiles
     std::vector<std::uint8_t> blocks;  ///< texture tiles, mip chain coarsest first
@@ -45,7 +47,11 @@ struct LoaderCounters {
 class Loader {
 public:
     /// Errors: those of TileStore::open_reader. `latency_ms` delays every read (to test slow disks).
-    static Result<std::unique_ptr<Loader>> start(const TileStore& store, int threads, int latency_ms);
+    static Result<std::unique_ptr<Loader>> start(std::shared_ptr<const TileStore> store, int threads, int latency_ms);
+    /// `store` outlives the loader.
+    static Result<std::unique_ptr<Loader>> start(const TileStore& store, int threads, int latency_ms) {
+        return start(std::shared_ptr<const TileStore>(std::shared_ptr<void>(), &store), threads, latency_ms);
+    }
     /// Waits for the reads in progress, not for their delays.
     ~Loader();
     Loader(const Loader&) = delete;
@@ -66,6 +72,13 @@ public:
         Loader& loader_;
         std::unique_lock<std::mutex> lock_;
     };
+
+    using Readers = std::vector<std::unique_ptr<TileReader>>;
+    /// From here on jobs are read from `store`, by a reader a thread; those not begun are forgotten. Waits for nothing:
+    /// what is being read still arrives, with the generation of its job.
+    void renew(std::shared_ptr<const TileStore> store, Readers readers);
+    /// How often the store was renewed.
+    std::int64_t generation() const;
 
     /// A finished tile, prefetches last; null when none is ready. `wait`: blocks until one is, if anything is under
     /// way. Give it back to recycle().

@@ -25,11 +25,12 @@ constexpr double kMebibyte = 1024.0 * 1024;
 
 }  // namespace
 
+// Twice the tables: while a store's new state is taken up, those of the old one and those of the new.
 std::int64_t height_slot_cost(const Dataset& d) {
-    return static_cast<std::int64_t>(slot_bytes(d.lattice.tile_cells_log2)) + TileCache::bookkeeping_bytes();
+    return static_cast<std::int64_t>(slot_bytes(d.lattice.tile_cells_log2)) + 2 * TileCache::bookkeeping_bytes();
 }
 std::int64_t texture_slot_cost(const Dataset& d) {
-    return static_cast<std::int64_t>(bc1_chain_bytes(d.texture_size_log2)) + TileCache::bookkeeping_bytes();
+    return static_cast<std::int64_t>(bc1_chain_bytes(d.texture_size_log2)) + 2 * TileCache::bookkeeping_bytes();
 }
 
 std::int64_t fixed_cost(const Dataset& d, int loader_threads) {
@@ -58,10 +59,21 @@ Result<MemoryPlan> plan_memory(const Dataset& d, std::int64_t budget_bytes, int 
     // Heights take their share, but leave textures room to split a root.
     const std::int64_t share = std::min(static_cast<std::int64_t>(kHeightShare * static_cast<double>(free)),
                                         free - std::min(roots + 4, d.texture_tiles) * texture);
-    plan.height_slots = std::min(std::max(share / height, roots + 4), d.height_tiles);
-    plan.texture_slots = std::clamp<std::int64_t>((free - plan.height_slots * height) / texture, 1, d.texture_tiles);
+    // Where all tiles fit, the roots of an update must still find room beside them.
+    const std::int64_t most_heights = d.height_tiles + roots, most_textures = d.texture_tiles + roots;
+    plan.height_slots = std::min(std::max(share / height, roots + 4), most_heights);
+    plan.texture_slots = std::clamp<std::int64_t>((free - plan.height_slots * height) / texture, 1, most_textures);
     // What a small texture pyramid leaves over goes to heights.
-    plan.height_slots = std::min((free - plan.texture_slots * texture) / height, d.height_tiles);
+    plan.height_slots = std::min((free - plan.texture_slots * texture) / height, most_heights);
+    if (plan.height_slots == most_heights && plan.texture_slots == most_textures) {
+        // Nothing is short: up to as much again, so that an update comes in beside what is drawn, and may add tiles.
+        const auto spare = static_cast<double>(free - plan.height_slots * height - plan.texture_slots * texture);
+        const auto heights = static_cast<double>(d.height_tiles), textures = static_cast<double>(d.texture_tiles);
+        const double more =
+            std::min(1.0, spare / (heights * static_cast<double>(height) + textures * static_cast<double>(texture)));
+        plan.height_slots += static_cast<std::int64_t>(more * heights);
+        plan.texture_slots += static_cast<std::int64_t>(more * textures);
+    }
     plan.resident_bytes = fixed + staging + plan.height_slots * height + plan.texture_slots * texture;
     return plan;
 }

@@ -13,6 +13,8 @@ namespace {
 
 constexpr double kFromTheStart = -std::numeric_limits<double>::infinity();
 
+constexpr std::int64_t kNobodys = -1;  // generation: no job counts
+
 constexpr std::size_t kUsualRequests = 1024;  // of a frame; more are taken, too
 
 const char* name_of(TileKind kind) { return kind == TileKind::height ? "height" : "texture"; }
@@ -24,18 +26,31 @@ std::string with_tile(const LoadedTile& tile) {
 
 }  // namespace
 
-Pager::Pager(const TileStore& store, const PagerOptions& options, TileSink& sink)
-    : store_(store),
+Pager::Tables::Tables(const PagerOptions& options, const Lattice& lattice, TileCache::Slots slots)
+    : heights(options.memory.height_slots, lattice, residency.heights, slots),
+      textures(options.textures ? options.memory.texture_slots : 0, lattice, residency.textures, slots) {
+    residency.has_textures = options.textures;
+}
+
+bool Pager::Tables::adds_up() const {
+    return heights.in_use() == heights.resident() + heights.loading() &&
+           textures.in_use() == textures.resident() + textures.loading();
+}
+
+Pager::Pager(std::shared_ptr<const TileStore> store, const PagerOptions& options, TileSink& sink)
+    : store_(std::move(store)),
       options_(options),
       sink_(sink),
-      heights_(options.memory.height_slots, store.dataset().lattice, residency_.heights),
-      textures_(options.textures ? options.memory.texture_slots : 0, store.dataset().lattice, residency_.textures) {
-    residency_.has_textures = options.textures;
+      shown_(std::make_unique<Tables>(options, store_->dataset().lattice, TileCache::Slots::all)),
+      coming_(std::make_unique<Tables>(options, store_->dataset().lattice, TileCache::Slots::none)) {
+    const Lattice& l = store_->dataset().lattice;
+    roots_.reserve(2 * static_cast<std::size_t>(l.root_rows * l.root_columns));
     missing_.reserve(kUsualRequests);
     promoted_.reserve(2 * static_cast<std::size_t>(options.memory.staging_slots));
 }
 
-Result<std::unique_ptr<Pager>> Pager::create(const TileStore& store, const PagerOptions& options, TileSink& sink) {
+Result<std::unique_ptr<Pager>> Pager::create(std::shared_ptr<const TileStore> store, const PagerOptions& options,
+                                             TileSink& sink) {
     std::unique_ptr<Pager> pager(new Pager(store, options, sink));
     auto loader = Loader::start(store, options.loader_threads, options.latency_ms);
     if (!loader) return loader.error();
@@ -45,11 +60,16 @@ Result<std::unique_ptr<Pager>> Pager::create(const TileStore& store, const Pager
     return pager;
 }
 
-Result<void> Pager::load_roots() {
-    const Lattice& l = store_.dataset().lattice;
+std::vector<TileId> Pager::root_ids() const {
+    const Lattice& l = store_->dataset().lattice;
     std::vector<TileId> ids;
     for (std::int64_t y = 0; y < l.root_rows; ++y)
         for (std::int64_t x = 0; x < l.root_columns; ++x) ids.push_back({0, x, y});
+    return ids;
+}
+
+Result<void> Pager::load_roots() {
+    const std::vector<TileId> ids = root_ids();
     auto stored = load_roots(TileKind::height, ids);
     if (!stored) return stored.error();
     if (!options_.textures) return {};
@@ -73,6 +93,7 @@ Result<std::vector<TileId>> Pager::load_roots(TileKind kind, std::span<const Til
         }
         LoadedTile* tile = loader_->take(true);
         ++taken;
+        if (tile->stale) return Error{ErrorCode::io, "the store was changed while it was opened"};
         if (tile->missing && kind == TileKind::height) {
             tiles.cancel(tile->job.slot);
         } else if (!tile->error.empty()) {
@@ -100,14 +121,54 @@ void Pager::report_damage(const LoadedTile& tile) {
     if (on_damage) on_damage(with_tile(tile) + "; its parent stands in");
 }
 
+// The store has gone on: what else is asked for of this state would come to nothing as well.
+void Pager::drop_stale(const LoadJob& job) {
+    TileCache& tiles = cache(job.kind);
+    --loading(job.kind).of(tiles.prefetch(job.slot));
+    tiles.cancel(job.slot);
+    stale_ = true;
+}
+
+void Pager::accept_root(const LoadedTile& tile) {
+    const LoadJob& job = tile.job;
+    TileCache& tiles = cache(job.kind);
+    --loading(job.kind).requested;
+    ++roots_done_;
+    if (tile.error.empty()) {
+        put(tile, kFromTheStart);
+        tiles.pin(job.slot);
+        if (job.kind == TileKind::height && options_.textures) roots_.push_back({TileKind::texture, job.id, 0});
+        return;
+    }
+    tiles.cancel(job.slot);
+    if (tile.missing && job.kind == TileKind::height) return;
+    // Nothing stands in for a root: what is shown stays.
+    ++counters_.damaged_tiles;
+    if (on_damage) on_damage(with_tile(tile) + "; an update of the store is not shown");
+    give_up_takeover();
+    gave_up_ = true;
+}
+
 void Pager::accept(LoadedTile* tile) {
     const LoadJob& job = tile->job;
+    if (job.generation != generation_) {
+        --orphans_[static_cast<std::size_t>(job.kind)];
+        return loader_->recycle(tile);
+    }
+    if (tile->stale) {
+        drop_stale(job);
+        return loader_->recycle(tile);
+    }
+    if (taking_over_ && job.id.level == 0) {
+        accept_root(*tile);
+        return loader_->recycle(tile);
+    }
     TileCache& tiles = cache(job.kind);
     const bool prefetch = tiles.prefetch(job.slot);
     --loading(job.kind).of(prefetch);
     counters_.bytes_read += tile->bytes_read;
     if (tile->error.empty()) {
-        put(*tile, residency_.now_s);
+        put(*tile, taking_over_ ? kFromTheStart : shown_->residency.now_s);
         ++counters_.tiles_paged_in;
         if (prefetch) ++counters_.prefetched;
     } else {
@@ -131,20 +192,103 @@ int Pager::take_arrivals(std::int64_t upload_bytes, bool wait) {
     return taken;
 }
 
+void Pager::use(Tables& tables, const Wishes& wishes) {
+    tables.heights.begin_frame();
+    tables.textures.begin_frame();
+    tables.heights.touch(wishes.standing_heights);
+    tables.textures.touch(wishes.standing_textures);
+    tables.heights.touch_planned(wishes.planned_heights);
+    tables.textures.touch_planned(wishes.planned_textures);
+}
+
 void Pager::request(const Wishes& wishes) {
-    heights_.begin_frame();
-    textures_.begin_frame();
-    heights_.touch(wishes.standing_heights);
-    textures_.touch(wishes.standing_textures);
-    heights_.touch_planned(wishes.planned_heights);
-    textures_.touch_planned(wishes.planned_textures);
-    note_wishes(wishes.requests);
-    if (!missing_.empty() || heights_.loading() + textures_.loading() > 0) {
+    assert(!taking_over_);
+    use(*shown_, wishes);
+    note_wishes(stale_ ? std::span<const TileRequest>{} : wishes.requests);
+    if (!missing_.empty() || shown_->heights.loading() + shown_->textures.loading() > 0) {
         Loader::QueueEdit queue(*loader_);
         update_queue(queue);
     }
-    counters_.tiles_paged_out = heights_.evictions() + textures_.evictions();
+    counters_.tiles_paged_out = shown_->evictions() + coming_->evictions();
     assert(adds_up());
+}
+
+void Pager::request(const Wishes& shown, const Wishes& coming) {
+    assert(taking_over_);
+    use(*shown_, shown);
+    if (!roots_ready()) {
+        use(*coming_, {});
+        if (!stale_) request_roots();
+    } else {
+        use(*coming_, coming);
+        note_wishes(stale_ ? std::span<const TileRequest>{} : coming.requests);
+        if (!missing_.empty() || coming_->heights.loading() + coming_->textures.loading() > 0) {
+            Loader::QueueEdit queue(*loader_);
+            update_queue(queue);
+        }
+    }
+    counters_.tiles_paged_out = shown_->evictions() + coming_->evictions();
+    assert(adds_up());
+}
+
+void Pager::begin_takeover(StoreState state) {
+    if (taking_over_) give_up_takeover();
+    forget_loads();
+    store_ = std::move(state.store);
+    loader_->renew(store_, std::move(state.readers));
+    generation_ = loader_->generation();
+    taking_over_ = true;
+    stale_ = gave_up_ = false;
+    roots_.clear();
+    roots_begun_ = roots_done_ = 0;
+    for (const TileId id : root_ids()) roots_.push_back({TileKind::height, id, 0});
+}
+
+// What was asked for is no longer waited for. What is being read or staged arrives all the same, and keeps its place
+// among the staged tiles until then.
+void Pager::forget_loads() {
+    Loader::QueueEdit queue(*loader_);
+    for (Loading& under_way : loading_)
+        orphans_[static_cast<std::size_t>(&under_way - loading_.data())] += under_way.total();
+    for (const LoadJob& job : queue.jobs()) --orphans_[static_cast<std::size_t>(job.kind)];
+    queue.jobs().clear();
+    loading_ = {};
+    for (const TileKind kind : {TileKind::height, TileKind::texture}) cache(kind).cancel_all();
+    generation_ = kNobodys;
+}
+
+void Pager::give_up_takeover() {
+    forget_loads();
+    for (const TileKind kind : {TileKind::height, TileKind::texture}) coming_->of(kind).hand_over(shown_->of(kind));
+    taking_over_ = false;
+    stale_ = true;  // what is shown is no longer what the store holds
+}
+
+void Pager::switch_over() {
+    assert(roots_ready());
+    for (const TileKind kind : {TileKind::height, TileKind::texture}) shown_->of(kind).hand_over(coming_->of(kind));
+    std::swap(shown_, coming_);
+    taking_over_ = false;
+    counters_.tiles_paged_out = shown_->evictions() + coming_->evictions();
+    assert(adds_up());
+}
+
+void Pager::request_roots() {
+    Loader::QueueEdit queue(*loader_);
+    full_ = {};
+    for (; roots_begun_ < roots_.size(); ++roots_begun_) {
+        const TileRequest& root = roots_[roots_begun_];
+        if (!may_begin(root)) return;
+        const std::int64_t before = loading(root.kind).total();
+        begin(root, queue.jobs());
+        if (loading(root.kind).total() == before) return;
+    }
+}
+
+// The state shown gives up what it draws with last.
+void Pager::make_room(TileCache& tiles, TileKind kind) {
+    if (!taking_over_ || tiles.has_free_slot()) return;
+    if (const auto slot = shown_->of(kind).give_away()) tiles.receive(*slot);
 }
 
 // Tells what is on its way already from what is missing.
@@ -153,7 +297,7 @@ void Pager::note_wishes(std::span<const TileRequest> requests) {
     promoted_.clear();
     for (const TileRequest& wish : requests) {
         if (wish.kind == TileKind::texture && !options_.textures) continue;
-        if (!store_.dataset().lattice.contains(wish.id)) continue;
+        if (!store_->dataset().lattice.contains(wish.id)) continue;
         TileCache& tiles = cache(wish.kind);
         const std::int32_t slot = tiles.find(wish.id);
         if (slot == kNotResident) missing_.push_back(&wish);
@@ -195,7 +339,7 @@ void Pager::update_queue(Loader::QueueEdit& queue) {
 bool Pager::may_begin(const TileRequest& wish) {
     const auto kind = static_cast<std::size_t>(wish.kind);
     const Loading& under_way = loading_[kind];
-    const std::int64_t all = options_.memory.staging_slots, ahead = prefetch_places();
+    const std::int64_t all = options_.memory.staging_slots - orphans_[kind], ahead = prefetch_places();
     if (wish.prefetch) return !no_idle_[kind] && under_way.prefetched < ahead && under_way.total() < all;
     if (full_[kind] && under_way.requested < all - ahead) ++counters_.refused;
     return !full_[kind] && under_way.requested < all - ahead;
@@ -204,6 +348,7 @@ bool Pager::may_begin(const TileRequest& wish) {
 void Pager::begin(const TileRequest& wish, std::vector<LoadJob>& jobs) {
     TileCache& tiles = cache(wish.kind);
     if (tiles.find(wish.id) != kNotResident) return;  // listed twice
+    make_room(tiles, wish.kind);
     const auto claim = wish.prefetch ? TileCache::Claim::idle : TileCache::Claim::any;
     auto slot = tiles.reserve(wish.id, wish.priority, claim);
     if (!slot && !wish.prefetch && cancel_a_prefetch(wish.kind, jobs)) slot = tiles.reserve(wish.id, wish.priority);
@@ -231,9 +376,9 @@ bool Pager::cancel_a_prefetch(TileKind kind, std::vector<LoadJob>& jobs) {
 }
 
 bool Pager::adds_up() const {
-    return loading_[0].total() == heights_.loading() && loading_[1].total() == textures_.loading() &&
-           heights_.in_use() == heights_.resident() + heights_.loading() &&
-           textures_.in_use() == textures_.resident() + textures_.loading();
+    const Tables& into = taking_over_ ? *coming_ : *shown_;
+    return loading_[0].total() == into.heights.loading() && loading_[1].total() == into.textures.loading() &&
+           shown_->adds_up() && coming_->adds_up();
 }
 
 }  // namespace scree

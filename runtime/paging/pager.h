@@ -40,14 +40,25 @@ struct PagerCounters {
     std::int64_t prefetched = 0;  ///< of tiles_paged_in, those that came before they were asked for in earnest
 };
 
+/// A later state of the store, and what it is read with.
+struct StoreState {
+    std::shared_ptr<const TileStore> store;
+    Loader::Readers readers;  ///< one for each thread of the loader
+};
+
 class Pager final {
 public:
     /// Loads and pins the roots. Errors: those of the store; a damaged root cannot be stood in for.
-    static Result<std::unique_ptr<Pager>> create(const TileStore& store, const PagerOptions& options, TileSink& sink);
+    static Result<std::unique_ptr<Pager>> create(const TileStore& store, const PagerOptions& options, TileSink& sink) {
+        return create(std::shared_ptr<const TileStore>(std::shared_ptr<void>(), &store), options, sink);
+    }
+    /// Errors besides: ErrorCode::io where the store was changed meanwhile.
+    static Result<std::unique_ptr<Pager>> create(std::shared_ptr<const TileStore> store, const PagerOptions& options,
+                                                 TileSink& sink);
 
-    const Residency& residency() const { return residency_; }
+    const Residency& residency() const { return shown_->residency; }
     /// What arrives from now on has come at `now_s`. Seconds from any start; never goes back.
-    void advance_clock(double now_s) { residency_.now_s = now_s; }
+    void advance_clock(double now_s) { shown_->residency.now_s = coming_->residency.now_s = now_s; }
 
     /// Hands arrived tiles to the sink, up to `upload_bytes`, prefetched ones last. `wait`: if nothing has arrived,
     /// blocks until something does. Returns the tiles taken.
@@ -66,11 +77,32 @@ public:
     /// nobody touched for TileCache::kIdleFrames, and give it back to any other request until they are being read.
     void request(const Wishes& wishes);
 
+    // A store that is updated while it is drawn. Every tile in a table is of one state of the store: what is read after
+    // the store was rewritten is thrown away, and from then on nothing more is loaded of the state shown. The new one
+    // is loaded into tables of its own, in slots that the old one gives up, its roots first.
+
+    /// The store is no longer what is shown, and nothing can be loaded until a later state is taken over.
+    bool stale() const { return stale_; }
+    /// The last takeover was: a root of the new state is damaged.
+    bool gave_up() const { return gave_up_; }
+    /// Begins to load a later state; one begun before is given up. Its dataset has the lattice and the texture size of
+    /// the one shown.
+    void begin_takeover(StoreState state);
+    bool taking_over() const { return taking_over_; }
+    /// From here on a selection may be made of coming().
+    bool roots_ready() const { return taking_over_ && roots_.size() == roots_done_; }
+    const Residency& coming() const { return coming_->residency; }
+    /// In place of request() meanwhile. `shown`: what is planned and drawn of it stays as there is room. `coming`
+    /// counts once its roots are ready. Together they should plan with no more than all slots.
+    void request(const Wishes& shown, const Wishes& coming);
+    /// The state that was coming is the one shown; the other is gone. Needs roots_ready().
+    void switch_over();
+
     bool idle() const { return loader_->under_way() == 0; }
     const PagerCounters& counters() const { return counters_; }
     LoaderCounters loader_counters(TileKind kind) const { return loader_->counters(kind); }
-    std::int64_t height_slots() const { return heights_.capacity(); }
-    std::int64_t texture_slots() const { return textures_.capacity(); }
+    std::int64_t height_slots() const { return shown_->heights.capacity(); }
+    std::int64_t texture_slots() const { return shown_->textures.capacity(); }
     /// Called once for each damaged tile.
     std::function<void(const std::string&)> on_damage;
 
@@ -81,13 +113,32 @@ private:
         std::int64_t& of(bool prefetch) { return prefetch ? prefetched : requested; }
         std::int64_t total() const { return requested + prefetched; }
     };
-    Pager(const TileStore& store, const PagerOptions& options, TileSink& sink);
+    /// The tiles of one state of the store.
+    struct Tables {
+        Tables(const PagerOptions& options, const Lattice& lattice, TileCache::Slots slots);
+        TileCache& of(TileKind kind) { return kind == TileKind::height ? heights : textures; }
+        bool adds_up() const;
+        std::int64_t evictions() const { return heights.evictions() + textures.evictions(); }
+        Residency residency;
+        TileCache heights, textures;
+    };
+    Pager(std::shared_ptr<const TileStore> store, const PagerOptions& options, TileSink& sink);
+    std::vector<TileId> root_ids() const;
     Result<void> load_roots();
     Result<std::vector<TileId>> load_roots(TileKind kind, std::span<const TileId> ids);
-    TileCache& cache(TileKind kind) { return kind == TileKind::height ? heights_ : textures_; }
+    /// Into which tiles are loaded.
+    Tables& loaded() { return taking_over_ ? *coming_ : *shown_; }
+    TileCache& cache(TileKind kind) { return loaded().of(kind); }
     Loading& loading(TileKind kind) { return loading_[static_cast<std::size_t>(kind)]; }
     void put(const LoadedTile& tile, double arrived_s);
     void accept(LoadedTile* tile);
+    void accept_root(const LoadedTile& tile);
+    void drop_stale(const LoadJob& job);
+    void forget_loads();
+    void give_up_takeover();
+    void request_roots();
+    void use(Tables& tables, const Wishes& wishes);
+    void make_room(TileCache& tiles, TileKind kind);
     void report_damage(const LoadedTile& tile);
     void note_wishes(std::span<const TileRequest> requests);
     void update_queue(Loader::QueueEdit& queue);
@@ -97,11 +148,15 @@ private:
     std::int64_t prefetch_places() const { return options_.memory.staging_slots / 8; }
     bool adds_up() const;
 
-    const TileStore& store_;
+    std::shared_ptr<const TileStore> store_;  ///< whose state is loaded
     PagerOptions options_;
     TileSink& sink_;
-    Residency residency_;
-    TileCache heights_, textures_;
+    std::unique_ptr<Tables> shown_, coming_;  ///< of `coming_`, without a takeover, only the memory counts
+    bool taking_over_ = false, stale_ = false, gave_up_ = false;
+    std::vector<TileRequest> roots_;                ///< of the state that comes; those of textures follow heights'
+    std::size_t roots_begun_ = 0, roots_done_ = 0;  ///< of `roots_`
+    std::int64_t generation_ = 0;                   ///< of the jobs that count
+    std::array<std::int64_t, 2> orphans_{};         ///< jobs of earlier ones, staged or being read, by kind
     std::unique_ptr<Loader> loader_;
     std::array<Loading, 2> loading_;                           ///< by kind
     std::array<bool, 2> full_{};                               ///< no slot is left in this frame for a request, by kind

@@ -15,12 +15,13 @@ std::size_t quadrant(TileId id) { return static_cast<std::size_t>(quadrant_of(id
 
 }  // namespace
 
-TileCache::TileCache(std::int64_t capacity, const Lattice& lattice, ResidentPages& pages)
+TileCache::TileCache(std::int64_t capacity, const Lattice& lattice, ResidentPages& pages, Slots slots_owned)
     : pages_(pages), root_columns_(lattice.root_columns) {
     const auto slots = static_cast<std::size_t>(capacity);
     entries_.resize(slots);
     free_.reserve(slots);
-    for (std::int64_t slot = capacity - 1; slot >= 0; --slot) free_.push_back(static_cast<std::int32_t>(slot));
+    if (slots_owned == Slots::all)
+        for (std::int64_t slot = capacity - 1; slot >= 0; --slot) receive(static_cast<std::int32_t>(slot));
     // Never more than half full, so that runs of the open addressing stay short.
     known_log2_ = static_cast<int>(std::bit_width(2 * slots + 1));
     known_.assign(std::size_t{1} << known_log2_, -1);
@@ -196,6 +197,46 @@ void TileCache::evict(std::int32_t slot, double for_need) {
     ++evictions_;
 }
 
+std::optional<std::int32_t> TileCache::give_away() {
+    if (free_.empty()) {
+        const std::int32_t victim = oldest_evictable();
+        if (victim < 0) return std::nullopt;
+        evict(victim, 0);
+    }
+    const std::int32_t slot = free_.back();
+    free_.pop_back();
+    --owned_;
+    return slot;
+}
+
+void TileCache::receive(std::int32_t slot) {
+    assert(state(slot) == State::free);
+    free_.push_back(slot);
+    ++owned_;
+}
+
+void TileCache::hand_over(TileCache& heir) {
+    for (std::int32_t slot = 0; slot < capacity(); ++slot)
+        if (entry(slot).state != State::free) heir.receive(slot);
+    for (const std::int32_t slot : free_) heir.receive(slot);
+    forget_all();
+}
+
+void TileCache::forget_all() {
+    // Roots were never paged in.
+    evictions_ += resident_ - std::count_if(entries_.begin(), entries_.end(), [](const Entry& e) { return e.pinned; });
+    owned_ = resident_ = loading_ = 0;
+    oldest_ = newest_ = -1;
+    exhausted_in_ = 0;
+    free_.clear();
+    unavailable_.clear();
+    std::fill(entries_.begin(), entries_.end(), Entry{});
+    std::fill(known_.begin(), known_.end(), -1);
+    std::fill(evicted_.begin(), evicted_.end(), Evicted{});
+    std::fill(pages_.children.begin(), pages_.children.end(), kNoChildren);
+    std::fill(pages_.roots.begin(), pages_.roots.end(), kNotResident);
+}
+
 std::optional<std::int32_t> TileCache::reserve(TileId id, double need, Claim claim) {
     assert(find(id) == kNotResident);
     const std::int32_t parent = id.level > 0 ? find_known(parent_of(id)) : kNotResident;
@@ -266,6 +307,11 @@ void TileCache::cancel(std::int32_t slot) {
     assert(state(slot) == State::loading);
     leave_parent(slot, kNotResident);
     forget(slot);
+}
+
+void TileCache::cancel_all() {
+    for (std::int32_t slot = 0; loading_ > 0 && slot < capacity(); ++slot)
+        if (state(slot) == State::loading) cancel(slot);
 }
 
 void TileCache::pin(std::int32_t slot) {

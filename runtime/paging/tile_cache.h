@@ -31,8 +31,10 @@ public:
     /// needed this many times as much as that other was: two tiles of like need would evict each other for ever.
     static constexpr double kWantedBack = 1.25;
 
+    /// Two caches may share slots: each slot belongs to one of them at any time.
+    enum class Slots { all, none };
     /// `pages` is kept up to date and outlives the cache; `lattice` says where the roots are.
-    TileCache(std::int64_t capacity, const Lattice& lattice, ResidentPages& pages);
+    TileCache(std::int64_t capacity, const Lattice& lattice, ResidentPages& pages, Slots slots = Slots::all);
     TileCache(const TileCache&) = delete;
     TileCache& operator=(const TileCache&) = delete;
 
@@ -55,6 +57,7 @@ public:
     void complete(std::int32_t slot, const HeightTileHeader& header, double arrived_s);
     void fail(std::int32_t slot);    ///< unreadable: the slot is freed, the tile stays known as unavailable
     void cancel(std::int32_t slot);  ///< a request not begun: forgotten, the slot is freed
+    void cancel_all();               ///< everything that is loading
     void pin(std::int32_t slot);     ///< resident for ever
 
     /// Of a loading tile: wanted in this frame, and how much.
@@ -64,8 +67,15 @@ public:
     bool prefetch(std::int32_t slot) const { return entry(slot).prefetch; }
     void promote(std::int32_t slot) { entry(slot).prefetch = false; }
 
+    bool has_free_slot() const { return !free_.empty(); }
+    /// Lets go of a slot: a free one, or the least recently used tile's. None: nothing may be evicted in this frame.
+    std::optional<std::int32_t> give_away();
+    void receive(std::int32_t slot);
+    /// Forgets every tile, unavailable ones too; all slots go to `heir`.
+    void hand_over(TileCache& heir);
+
     std::int64_t capacity() const { return static_cast<std::int64_t>(entries_.size()); }
-    std::int64_t in_use() const { return capacity() - static_cast<std::int64_t>(free_.size()); }
+    std::int64_t in_use() const { return owned_ - static_cast<std::int64_t>(free_.size()); }
     std::int64_t resident() const { return resident_; }
     std::int64_t loading() const { return loading_; }
     std::int64_t evictions() const { return evictions_; }
@@ -111,6 +121,7 @@ private:
     void evict(std::int32_t slot, double for_need);
     void leave_parent(std::int32_t slot, std::int32_t link);
     void forget(std::int32_t slot);
+    void forget_all();
     std::int32_t& link_to(const Entry& e);
 
     std::size_t home(TileId id) const;
@@ -131,6 +142,7 @@ private:
     std::vector<Evicted> evicted_;
     std::int32_t oldest_ = -1, newest_ = -1;  ///< resident tiles that are not pinned
     std::uint64_t frame_ = 1, clock_ = 0, exhausted_in_ = 0;
+    std::int64_t owned_ = 0;  ///< slots, of all
     std::int64_t resident_ = 0, loading_ = 0, evictions_ = 0;
 };
 

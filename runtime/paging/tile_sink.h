@@ -4,13 +4,18 @@
 #include <cstdint>
 #include <span>
 
+#include "common/dataset.h"
 #include "common/mesh/vertex_slot.h"
+#include "runtime/paging/memory_plan.h"
 
 namespace scree {
 
 class TileSink {
 public:
     virtual ~TileSink() = default;
+    /// Before the first tile of another state of the store is drawn. Where the plan is another one than before, no slot
+    /// holds anything afterwards.
+    virtual Result<void> renew(const Dataset& /*dataset*/, const MemoryPlan& /*plan*/) { return {}; }
     virtual void put_height(std::int32_t slot, std::span<const SlotVertex> vertices) = 0;
     virtual void put_texture(std::int32_t slot, std::span<const std::uint8_t> chain) = 0;
 };

@@ -26,6 +26,9 @@ public:
 
     const Dataset& dataset() const override { return terrain_.dataset(); }
     Result<std::unique_ptr<TileReader>> open_reader() const override;
+    /// As if another program had updated it in place.
+    void rewrite() { rewritten_ = true; }
+    bool is_rewritten() const override { return rewritten_; }
 
     /// While held, reads begin but do not end.
     void hold() const;
@@ -48,6 +51,7 @@ private:
 
     const SyntheticTerrain& terrain_;
     const int max_latency_us_;
+    std::atomic<bool> rewritten_ = false;
     std::map<Key, Damage> damaged_;
     mutable std::mutex mutex_;
     mutable std::condition_variable changed_;

@@ -1,0 +1,56 @@
+// StoreWatch: sees that a store was updated, and opens what it holds now, on a thread of its own, so that no frame
+// waits for a disk or for a writer's lock.
+#pragma once
+
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "common/store/sqlite_store.h"
+#include "runtime/paging/loader.h"
+
+namespace scree {
+
+/// A store as it was at one moment, with readers that were opened for it.
+struct OpenedStore {
+    std::shared_ptr<const SqliteStore> store;
+    Loader::Readers readers;
+};
+
+/// Opens the store under `path` with so many readers. Waits while another program commits. Errors: those of
+/// SqliteStore.
+Result<OpenedStore> open_store(const std::string& path, int readers);
+
+/// take() is for one thread, and never waits.
+class StoreWatch {
+public:
+    /// Looks four times a second whether `store` has changed.
+    StoreWatch(std::shared_ptr<const SqliteStore> store, int readers);
+    ~StoreWatch();
+    StoreWatch(const StoreWatch&) = delete;
+    StoreWatch& operator=(const StoreWatch&) = delete;
+
+    /// What the store has become since the last call, once it could be opened.
+    std::optional<OpenedStore> take();
+    /// Why it cannot be opened just now, once for every cause; it is tried again.
+    std::optional<std::string> take_trouble();
+
+private:
+    void run();
+    void look();
+
+    std::shared_ptr<const SqliteStore> latest_;  // of the thread
+    const int readers_;
+    std::mutex mutex_;
+    std::condition_variable stop_;
+    bool stopping_ = false;
+    std::optional<OpenedStore> opened_;
+    std::string last_trouble_;
+    std::optional<std::string> trouble_;
+    std::thread thread_;
+};
+
+}  // namespace scree
