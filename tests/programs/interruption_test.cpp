@@ -119,7 +119,7 @@ TEST_F(Interruption, AFullDiskIsFoundBeforeAndDuringTheBuild) {
     EXPECT_NE(before.err.find("are free"), std::string::npos) << describe(before);
 
     for (const std::uintmax_t when_bytes : {0u, 500000u}) {  // another program takes the space meanwhile
-        ASSERT_EQ(::mount("scree test", out_.c_str(), "tmpfs", 0, "size=64m"), 0);
+        ASSERT_EQ(::mount("scree test", out_.c_str(), "tmpfs", 0, "size=128m"), 0);
         ProgramOptions options;
         bool filled = false;
         options.meanwhile = [&] {
