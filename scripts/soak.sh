@@ -4,6 +4,7 @@
 # any run failed.
 #
 #     scripts/soak.sh [OPTIONS] STORE [MINUTES]
+#     scripts/soak.sh --cut-off [--build FOLDER] [MINUTES]
 #
 #     --build FOLDER    the build to try (build/release)
 #     --frames N        poses a run (1500)
@@ -13,13 +14,18 @@
 #
 # Runs begin until MINUTES (10) have passed, at least one a budget. Every second run looks for see-through pixels, which
 # costs a second drawing and a ray a pixel.
+#
+# With --cut-off no flight: the long forms of the tests that cut builds and updates off (docs/resume-and-update.md, "How it
+# is proved"), with the seeds 1, 2, 3 and so on, until MINUTES have passed: a fault of every kind at every operation,
+# hundreds of builds and updates killed. A line a seed and program; what failed is printed whole. The tests read
+# SCREE_LONG=1 and SCREE_TEST_SEED, which repeat one by hand.
 set -euo pipefail
 
 root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd -P)
 . "$root/scripts/report_values.sh"
 
-build=$root/build/release frames=1500 size=320x240 budgets=32M,64M,256M out=
-usage() { sed -n 's/^# \{0,1\}//; 2,15p' "${BASH_SOURCE[0]}"; }
+build=$root/build/release frames=1500 size=320x240 budgets=32M,64M,256M cut_off= out=
+usage() { sed -n '2,/^set /{/^set /d; s/^# \{0,1\}//; p}' "${BASH_SOURCE[0]}"; }
 words=()
 while (($# > 0)); do
     case $1 in
@@ -28,12 +34,43 @@ while (($# > 0)); do
             printf -v "${1#--}" %s "$2"
             shift
             ;;
+        --cut-off) cut_off=1 ;;
         -h | --help) usage; exit 0 ;;
         -*) usage >&2; exit 2 ;;
         *) words+=("$1") ;;
     esac
     shift
 done
+# cut_off_once SEED PROGRAM FILTER: one run of tests in their long form; its line, and 1 if any failed.
+cut_off_once() {
+    local name=${2##*/} text
+    if text=$(SCREE_LONG=1 SCREE_TEST_SEED=$1 "$2" --gtest_filter="$3" 2>&1); then
+        echo "seed $1, $name: $(grep -E '\((seed|[0-9]+ ms total)|updates? killed' <<<"$text" | sed 's/ (seed.*//; s/^\[=*\] //' | paste -sd ';')"
+    else
+        echo "FAILED seed $1, $name:"
+        echo "$text"
+        return 1
+    fi
+}
+
+if [[ -n $cut_off ]]; then
+    [[ ${#words[@]} -le 1 ]] || { usage >&2; exit 2; }
+    minutes=${words[0]:-10}
+    [[ $minutes =~ ^[0-9]+$ ]] || { echo "MINUTES $minutes is not a whole number" >&2; exit 2; }
+    crashes=$build/tests/tools/pyramid/scree_build_crash_test programs=$build/tests/programs/scree_program_tests
+    for program in "$crashes" "$programs"; do
+        [[ -x $program ]] || { echo "$program is not there: build first" >&2; exit 2; }
+    done
+    end=$((SECONDS + 60 * minutes)) seed=0 failed=0
+    while ((seed == 0 || SECONDS < end)); do
+        seed=$((seed + 1))
+        cut_off_once $seed "$crashes" '*' || failed=$((failed + 1))
+        cut_off_once $seed "$programs" 'Interruption.*:Resumed.*:UpdateKilled.*' || failed=$((failed + 1))
+    done
+    echo "$seed seeds, $failed runs failed"
+    ((failed == 0))
+    exit
+fi
 [[ ${#words[@]} -ge 1 && ${#words[@]} -le 2 ]] || { usage >&2; exit 2; }
 store=${words[0]} minutes=${words[1]:-10}
 [[ $minutes =~ ^[0-9]+$ ]] || { echo "MINUTES $minutes is not a whole number" >&2; exit 2; }

@@ -1,4 +1,5 @@
-// Ctrl-C, full disks, limits: whole or absent, and nothing else left behind.
+// Ctrl-C, full disks, limits: the final name is whole or absent, nothing is left but OUT.partial, and the same command
+// makes of it the store of an undisturbed build.
 #include <gtest/gtest.h>
 #include <sys/mount.h>
 #include <unistd.h>
@@ -24,7 +25,13 @@ protected:
             0);
         std::filesystem::create_directory(out_);
     }
-    ProgramRun interrupted_build(int signal, std::uintmax_t when_bytes) const {
+    std::vector<std::string> command() const {
+        return {"build",     folder_.file("land/dem.tif"),
+                "--imagery", folder_.file("land/ortho.tif"),
+                "-o",        store_,
+                "--threads", "1"};
+    }
+    ProgramRun interrupted_build(int signal, std::uintmax_t when_bytes, bool force = false) const {
         ProgramOptions options;
         options.signal = signal;
         options.signal_when = [partial = store_ + ".partial", when_bytes] {
@@ -32,32 +39,49 @@ protected:
             const auto size = std::filesystem::file_size(partial, error);
             return !error && size >= when_bytes;
         };
-        return scree({"build", folder_.file("land/dem.tif"), "--imagery", folder_.file("land/ortho.tif"), "-o", store_,
-                      "--threads", "1", "--force"},
-                     options);
+        auto arguments = command();
+        if (force) arguments.push_back("--force");
+        return scree(arguments, options);
+    }
+    std::string undisturbed_digest() const {
+        std::vector<std::string> inputs{folder_.file("land/dem.tif"), "--imagery", folder_.file("land/ortho.tif")};
+        build_store_from(inputs, folder_.file("whole.scree"));
+        return digest_of(folder_.file("whole.scree"));
+    }
+    /// The same command ends what was begun.
+    void expect_ends_in(const std::string& digest) const {
+        const auto run = scree(command());
+        EXPECT_EQ(run.exit_code, 0) << describe(run);
+        EXPECT_EQ(digest_of(store_), digest);
+        std::filesystem::remove(store_);
+        EXPECT_FALSE(std::filesystem::exists(store_ + ".partial"));
+        EXPECT_FALSE(std::filesystem::exists(store_ + ".partial-journal"));
     }
 
     TemporaryFolder folder_;
     std::string out_ = folder_.file("out"), store_ = folder_.file("out/s.scree");
 };
 
-TEST_F(Interruption, EndsABuildWith130AndLeavesNothing) {
+TEST_F(Interruption, EndsABuildWith130AndTheSameCommandGoesOn) {
+    const std::string digest = undisturbed_digest();
     for (const int signal : {SIGINT, SIGTERM})
         for (const std::uintmax_t when_bytes : {0u, 100000u}) {
             const auto run = interrupted_build(signal, when_bytes);
             ASSERT_TRUE(run.signalled) << "the build was over too soon\n" << describe(run);
             EXPECT_EQ(run.exit_code, 130) << describe(run);
             EXPECT_LT(run.seconds, 20);
-            expect_only(out_, {});
+            expect_at_most_partial(store_);
+            if (when_bytes == 0) expect_only(out_, {});
+            expect_ends_in(digest);
         }
 }
 
 TEST_F(Interruption, KeepsTheStoreThatForceWouldReplace) {
     write_bytes(store_, {'o', 'l', 'd'});
-    const auto run = interrupted_build(SIGINT, 100000);
+    const auto run = interrupted_build(SIGINT, 100000, true);
     EXPECT_EQ(run.exit_code, 130) << describe(run);
     EXPECT_EQ(read_bytes(store_), (std::vector<std::uint8_t>{'o', 'l', 'd'}));
-    expect_only(out_, {"s.scree"});
+    expect_at_most_partial(store_, {"s.scree"});
 }
 
 TEST_F(Interruption, ReplacesAnAbandonedPartialFile) {
@@ -67,50 +91,55 @@ TEST_F(Interruption, ReplacesAnAbandonedPartialFile) {
     EXPECT_EQ(scree({"verify", store_, "--quiet"}).exit_code, 0);
 }
 
-TEST_F(Interruption, WritesThatFailHalfWayAreFiveAndLeaveNothing) {
+TEST_F(Interruption, WritesThatFailHalfWayAreFiveAndTheSameCommandGoesOn) {
+    const std::string digest = undisturbed_digest();
+    std::filesystem::create_directory(folder_.file("more land"));
     for (const std::int64_t limit : {20000, 300000, 3000000}) {
         ProgramOptions options;
         options.largest_file_bytes = limit;
-        const auto run = scree({"build", folder_.file("land/dem.tif"), "--imagery", folder_.file("land/ortho.tif"),
-                                "-o", store_, "--quiet"},
-                               options);
+        const auto run = scree(command(), options);
         EXPECT_EQ(run.exit_code, 5) << "limit " << limit << '\n' << describe(run);
         EXPECT_NE(run.err, "");
-        expect_only(out_, {});
-        const auto land = scree({"synth", "-o", folder_.file("out"), "--size", "1025", "--quiet"}, options);
+        expect_at_most_partial(store_);
+        expect_ends_in(digest);
+        const auto land = scree({"synth", "-o", folder_.file("more land"), "--size", "1025", "--quiet"}, options);
         EXPECT_EQ(land.exit_code, 5) << describe(land);
-        expect_only(out_, {});
+        expect_only(folder_.file("more land"), {});
     }
 }
 
 TEST_F(Interruption, AFullDiskIsFoundBeforeAndDuringTheBuild) {
+    const std::string digest = undisturbed_digest();
     if (::mount("scree test", out_.c_str(), "tmpfs", 0, "size=2m") != 0)
         GTEST_SKIP() << "needs the right to mount a tmpfs";
-    const auto before = scree(
-        {"build", folder_.file("land/dem.tif"), "--imagery", folder_.file("land/ortho.tif"), "-o", store_, "--quiet"});
+    const auto before = scree(command());
     expect_only(out_, {});
     ASSERT_EQ(::umount2(out_.c_str(), MNT_DETACH), 0);
     EXPECT_EQ(before.exit_code, 5) << describe(before);
     EXPECT_NE(before.err.find("are free"), std::string::npos) << describe(before);
 
-    ASSERT_EQ(::mount("scree test", out_.c_str(), "tmpfs", 0, "size=64m"), 0);
-    ProgramOptions options;  // another program takes the space once the build has begun
-    bool filled = false;
-    options.meanwhile = [&] {
-        if (filled || !std::filesystem::exists(store_ + ".partial")) return;
-        filled = true;
-        std::ofstream filler(out_ + "/filler", std::ios::binary);
-        const std::vector<char> block(1 << 20);
-        while (filler.write(block.data(), static_cast<std::streamsize>(block.size())) && filler.flush()) {
-        }
-    };
-    const auto during = scree({"build", folder_.file("land/dem.tif"), "--imagery", folder_.file("land/ortho.tif"), "-o",
-                               store_, "--quiet", "--threads", "1"},
-                              options);
-    EXPECT_TRUE(filled);
-    expect_only(out_, {"filler"});
-    EXPECT_EQ(during.exit_code, 5) << describe(during);
-    EXPECT_EQ(::umount2(out_.c_str(), MNT_DETACH), 0);
+    for (const std::uintmax_t when_bytes : {0u, 500000u}) {  // another program takes the space meanwhile
+        ASSERT_EQ(::mount("scree test", out_.c_str(), "tmpfs", 0, "size=128m"), 0);
+        ProgramOptions options;
+        bool filled = false;
+        options.meanwhile = [&] {
+            std::error_code error;
+            const auto size = std::filesystem::file_size(store_ + ".partial", error);
+            if (filled || error || size < when_bytes) return;
+            filled = true;
+            std::ofstream filler(out_ + "/filler", std::ios::binary);
+            const std::vector<char> block(1 << 20);
+            while (filler.write(block.data(), static_cast<std::streamsize>(block.size())) && filler.flush()) {
+            }
+        };
+        const auto during = scree(command(), options);
+        EXPECT_TRUE(filled);
+        expect_at_most_partial(store_, {"filler"});
+        EXPECT_EQ(during.exit_code, 5) << describe(during);
+        std::filesystem::remove(out_ + "/filler");
+        expect_ends_in(digest);
+        EXPECT_EQ(::umount2(out_.c_str(), MNT_DETACH), 0);
+    }
 }
 
 TEST_F(Interruption, TwoBuildsOfOneStoreNeverLeaveHalfOfIt) {

@@ -102,4 +102,13 @@ void expect_only(const std::string& folder, const std::vector<std::string>& name
     EXPECT_EQ(found, std::set<std::string>(names.begin(), names.end()));
 }
 
+void expect_at_most_partial(const std::string& store, const std::vector<std::string>& others) {
+    const std::filesystem::path path = store;
+    const std::string partial = path.filename().string() + ".partial";
+    std::set<std::string> allowed(others.begin(), others.end());
+    allowed.insert({partial, partial + "-journal"});
+    for (const auto& entry : std::filesystem::directory_iterator(path.parent_path()))
+        EXPECT_EQ(allowed.count(entry.path().filename().string()), 1u) << entry.path() << " was left";
+}
+
 }  // namespace scree::test

@@ -24,5 +24,8 @@ std::string digest_of(const std::string& store);
 
 /// Nothing that a stopped or refused program leaves behind: no OUT.partial, OUT.heights, journals.
 void expect_only(const std::string& folder, const std::vector<std::string>& names);
+/// What a build of `store` that was cut off may leave in the store's folder: OUT.partial and its journal, besides
+/// `others`.
+void expect_at_most_partial(const std::string& store, const std::vector<std::string>& others = {});
 
 }  // namespace scree::test

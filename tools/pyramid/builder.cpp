@@ -16,6 +16,7 @@
 
 #include "common/process_usage.h"
 #include "common/report.h"
+#include "common/store/page_checksum_vfs.h"
 #include "tools/partial_file.h"
 #include "tools/progress.h"
 #include "tools/pyramid/build_state.h"
@@ -88,7 +89,7 @@ private:
         if (!store || (*store)->state().empty()) {
             store = Error{};
             auto finished = SqliteStore::open(partial_->path());
-            complete_ = finished && identity_of((*finished)->dataset()) == state_.identity;
+            complete_ = finished && identity_of((*finished)->dataset()) == state_.identity && pages_sound();
             if (complete_) state_.dataset = (*finished)->dataset();
             return {};
         }
@@ -101,6 +102,12 @@ private:
         state_ = std::move(*state);
         store_ = std::move(*store);
         return {};
+    }
+
+    // A store that is to be had by giving it its name is read once more: one that is damaged is made anew.
+    bool pages_sound() const {
+        const auto scan = scan_page_checksums(partial_->path());
+        return scan && scan->damaged.empty();
     }
 
     Result<void> make(BuildReport& report) {
