@@ -45,7 +45,7 @@ done
 cut_off_once() {
     local name=${2##*/} text
     if text=$(SCREE_LONG=1 SCREE_TEST_SEED=$1 "$2" --gtest_filter="$3" 2>&1); then
-        echo "seed $1, $name: $(grep -E '\((seed|[0-9]+ ms total)|updates? killed' <<<"$text" | sed 's/ (seed.*//; s/^\[=*\] //' | paste -sd ';')"
+        echo "seed $1, $name: $(grep -E '\(seed |tests? suites? ran|updates killed' <<<"$text" | sed 's/ (seed.*//; s/^\[=*\] //' | paste -sd ';')"
     else
         echo "FAILED seed $1, $name:"
         echo "$text"

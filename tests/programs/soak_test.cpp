@@ -50,6 +50,8 @@ TEST_F(Soak, RefusesWhatItDoesNotUnderstand) {
     EXPECT_EQ(soak({}).exit_code, 2);
     EXPECT_EQ(soak({"--nonsense", store_}).exit_code, 2);
     EXPECT_EQ(soak({store_, "soon"}).exit_code, 2);
+    EXPECT_EQ(soak({"--cut-off", "soon"}).exit_code, 2);
+    EXPECT_EQ(soak({"--cut-off", "1", "2"}).exit_code, 2);
 }
 
 }  // namespace

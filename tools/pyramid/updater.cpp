@@ -413,20 +413,18 @@ private:
         if (auto ok = writer_->flush(); !ok) return ok;
         auto target = SqliteStoreWriter::amend(options_.store);
         if (!target) return target.error();
-        dataset_.height_tiles = 0;
         for (const TileKind kind : {TileKind::height, TileKind::texture, TileKind::seed})
             if (auto ok = apply(**target, kind); !ok) return ok;
-        dataset_.height_tiles = count(**target, TileKind::height);
-        dataset_.texture_tiles = count(**target, TileKind::texture);
+        if (auto ok = count(**target, TileKind::height, dataset_.height_tiles); !ok) return ok;
+        if (auto ok = count(**target, TileKind::texture, dataset_.texture_tiles); !ok) return ok;
         if (auto ok = (*target)->finish(dataset_); !ok) return ok;
         writer_.reset();
         return {};
     }
 
-    static std::int64_t count(const SqliteStoreWriter& store, TileKind kind) {
-        std::int64_t rows = 0;
-        const auto ok = store.for_each_key(kind, [&](std::int64_t) { ++rows; });
-        return ok ? rows : 0;
+    static Result<void> count(const SqliteStoreWriter& store, TileKind kind, std::int64_t& rows) {
+        rows = 0;
+        return store.for_each_key(kind, [&](std::int64_t) { ++rows; });
     }
 
     // Tiles that were made again: those that differ are written, those that are no more removed.

@@ -65,10 +65,11 @@ void expect_io(const Result<T>& result) {
 
 /// Counts for the report of a sweep.
 struct Tally {
+    std::int64_t operations = 0;  ///< of the last undisturbed run
     int faults = 0, reported = 0, survived = 0, resumed = 0;
     void print(const char* what) const {
-        std::cout << fmt::format("{}: {} faults, {} reported, {} survived, {} gone on from (seed {})\n", what, faults,
-                                 reported, survived, resumed, test::seed());
+        std::cout << fmt::format("{}: {} operations, {} faults, {} reported, {} survived, {} gone on from (seed {})\n",
+                                 what, operations, faults, reported, survived, resumed, test::seed());
     }
 };
 
@@ -157,6 +158,7 @@ TEST_F(BuildCrash, AFaultAtAnyOperationLeavesNoHalfStoreAndIsGoneOnFrom) {
     const std::string digest = undisturbed_digest();
     const std::int64_t operations = operations_of([&] { return build().ok(); });
     Tally tally;
+    tally.operations = operations;
     for (const FaultKind kind : kFaults)
         for (const std::int64_t k : sweep(operations, random)) {
             const std::uint64_t seed = random();
@@ -202,6 +204,7 @@ TEST_F(BuildCrash, AFaultWhileABuildIsTakenUpLosesNoCheckpoint) {
             return report.ok();
         });
         EXPECT_GT(reused, 0);
+        tally.operations = left;
         for (const FaultKind kind : kFaults)
             for (const std::int64_t k : sweep(left, random)) {
                 const std::uint64_t seed = random();
@@ -312,6 +315,7 @@ TEST_F(UpdateCrash, AFaultAtAnyOperationLeavesTheOldStoreOrTheNewOne) {
     restore();
     const std::int64_t operations = operations_of([&] { return update().ok(); });
     Tally tally;
+    tally.operations = operations;
     int found_new = 0;
     for (const FaultKind kind : kFaults)
         for (const std::int64_t k : sweep(operations, random)) {
