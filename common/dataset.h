@@ -24,8 +24,8 @@ struct SourceRecord {
     std::int64_t height = 0;
     /// 16 hexadecimal digits (docs/store-format.md, "Dataset"); empty in stores that were made without.
     std::string fingerprint{};
-    /// West, south, east, north of its samples in the dataset's CRS, and what tells the grid that its samples are counted
-    /// in from another one. For updates; stores that were made without have neither.
+    /// West, south, east, north of its samples in the dataset's CRS, and what tells the grid that its samples are
+    /// counted in from another one. For updates; stores that were made without have neither.
     std::optional<std::array<double, 4>> box_m{};
     std::string layer{};
 };

@@ -136,9 +136,8 @@ TEST_F(Updates, KeepTheStretchThatTheBuildChose) {
     const std::string base = dem("base.tif", 200, 160, 3);
     const auto deep = [&](const std::string& name, int width, double x, std::uint32_t least) {
         Place place{400000 + x, 5300000, 2.5, 32633, true};
-        write_image(folder_.file(name), width, 640, 3, 16, &place, [&](int i, int j, int c) {
-            return least + 40 * patchwork(i, j, c);
-        });
+        write_image(folder_.file(name), width, 640, 3, 16, &place,
+                    [&](int i, int j, int c) { return least + 40 * patchwork(i, j, c); });
         return folder_.file(name);
     };
     const std::string under = deep("under.tif", 400, 0, 1000), next = deep("next.tif", 400, 1000, 30000);
@@ -173,10 +172,10 @@ TEST_F(Updates, AnyChangesInAnyOrder) {
             const double shift = kind == 0 ? 0 : 1.1, step = kind == 2 ? 5 : 2.5;
             const int width = uniform(random, 20, 400), height = uniform(random, 20, 400);
             // Each reaches into the land, wherever it begins.
-            const double x = 2.5 * uniform(random, 45 - width, 600) + shift, y = 2.5 * uniform(random, 45 - height, 500) + shift;
-            const std::string path =
-                kind == 3 ? image(name, width, height, 448868 + x, y - 9672, made * 31, 32632)
-                          : image(name, width, height, x, y, made * 31, 32633, step);
+            const double x = 2.5 * uniform(random, 45 - width, 600) + shift,
+                         y = 2.5 * uniform(random, 45 - height, 500) + shift;
+            const std::string path = kind == 3 ? image(name, width, height, 448868 + x, y - 9672, made * 31, 32632)
+                                               : image(name, width, height, x, y, made * 31, 32633, step);
             images.push_back(path);
             return path;
         };

@@ -49,11 +49,12 @@ int run_update(int argc, char** argv) {
     if (!report) return report_error("scree update", report.error());
     for (const std::string& warning : report->warnings) note("warning: {}\n", warning);
     if (!options.quiet)
-        note("{}: {} of {} districts made again; {} height tiles and {} texture tiles written, {} removed; {:.1f} s, "
-             "{:.1f} CPU s, peak {} MiB\n",
-             options.store, report->districts_built, report->districts, report->height_tiles_written,
-             report->texture_tiles_written, report->tiles_removed, report->seconds, report->cpu_seconds,
-             report->peak_rss_bytes >> 20);
+        note(
+            "{}: {} of {} districts made again; {} height tiles and {} texture tiles written, {} removed; {:.1f} s, "
+            "{:.1f} CPU s, peak {} MiB\n",
+            options.store, report->districts_built, report->districts, report->height_tiles_written,
+            report->texture_tiles_written, report->tiles_removed, report->seconds, report->cpu_seconds,
+            report->peak_rss_bytes >> 20);
     if (json.empty()) return 0;
     const nlohmann::ordered_json out = {{"seconds", report->seconds},
                                         {"cpu_seconds", report->cpu_seconds},

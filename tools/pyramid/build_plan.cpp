@@ -55,7 +55,7 @@ bool north_up(const Georeference& where) { return where.axis_aligned() && where.
 void choose_ways(BuildPlan& plan) {
     const MosaicPlan& m = plan.mosaic;
     plan.heights_in_place = m.base_shift == 0 && m.heights.size() == 1 && m.heights_copied && m.same_units &&
-                             north_up(m.heights.front().where);
+                            north_up(m.heights.front().where);
     plan.integer_heights =
         m.heights_copied && m.same_units &&
         std::all_of(m.heights.begin(), m.heights.end(), [](const PlacedFile& f) { return is_integer(f.info.type); });
@@ -165,8 +165,8 @@ std::vector<std::size_t> canonical_order(const std::vector<PlacedFile>& files, c
     return order;
 }
 
-// Of each file: what its layer's samples are counted from, and which of its sides are the layer's, where resampling ends
-// otherwise than at a neighbour without samples (SourceRecord::layer).
+// Of each file: what its layer's samples are counted from, and which of its sides are the layer's, where resampling
+// ends otherwise than at a neighbour without samples (SourceRecord::layer).
 std::vector<std::string> layer_names(const std::vector<PlacedFile>& files, const std::vector<Layer>& layers,
                                      const Crs& crs) {
     std::vector<std::string> names(files.size());
@@ -228,8 +228,8 @@ Result<BuildPlan> plan_build(const BuildOptions& o) {
     d.vertical_datum = m.vertical_datum;
     d.attribution = o.attribution;
     d.options = options_record(o, m.imagery.empty() ? std::nullopt : plan.open.colours.stretch);
-    for (const auto& [files, layers_of, role] : {std::tuple(&m.heights, &m.height_layers, "heights"),
-                                                 std::tuple(&m.imagery, &m.image_layers, "imagery")}) {
+    for (const auto& [files, layers_of, role] :
+         {std::tuple(&m.heights, &m.height_layers, "heights"), std::tuple(&m.imagery, &m.image_layers, "imagery")}) {
         auto boxes = boxes_of(*files, m.crs);
         if (!boxes) return boxes.error();
         const std::vector<std::string> layers = layer_names(*files, *layers_of, m.crs);

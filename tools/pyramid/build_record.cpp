@@ -170,8 +170,7 @@ std::map<std::string, std::string> options_record(const BuildOptions& o, const s
     number("height-quantum", o.height_quantum_m);
     if (!o.colours.bands.empty()) record["bands"] = fmt::format("{}", fmt::join(o.colours.bands, ","));
     if (stretch)
-        record["stretch"] =
-            fmt::format("{}{},{}", stretch->spares_8bit ? kChosen : "", stretch->low, stretch->high);
+        record["stretch"] = fmt::format("{}{},{}", stretch->spares_8bit ? kChosen : "", stretch->low, stretch->high);
     number("imagery-nodata", o.colours.nodata);
     if (o.texture_quality == TextureQuality::high) record["texture-quality"] = "high";
     if (o.tile_size != plain.tile_size) record["tile-size"] = fmt::format("{}", o.tile_size);

@@ -23,11 +23,11 @@ struct BuildReport {
     std::int64_t height_tiles = 0;
     std::int64_t texture_tiles = 0;
     std::int64_t store_bytes = 0;
-    std::int64_t reused_tiles = 0;  ///< of a build that was cut off
+    std::int64_t reused_tiles = 0;                ///< of a build that was cut off
     std::array<double, kStages> stage_seconds{};  ///< CPU, by Stage; decode with the decoders' processes
-    std::int64_t filled_samples = 0;    ///< of interior voids
-    std::vector<std::string> warnings;  ///< what the user should look into
-    std::vector<std::string> notes;     ///< what was done that may surprise
+    std::int64_t filled_samples = 0;              ///< of interior voids
+    std::vector<std::string> warnings;            ///< what the user should look into
+    std::vector<std::string> notes;               ///< what was done that may surprise
 };
 
 /// Checks the disk and that OUT may be written; prints what will be needed unless quiet.

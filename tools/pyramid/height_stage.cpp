@@ -78,7 +78,8 @@ Result<void> spool_stack(const BuildPlan& plan, const HeightStack& stack, Height
 
 // Interior voids get heights; what was left is said.
 Result<void> fill_voids(const BuildPlan& plan, const BuildOptions& options, const HeightUnits& units,
-                        HeightSpool& spool, const std::atomic<bool>& stop, HeightStageResult& report, HeightRange& range) {
+                        HeightSpool& spool, const std::atomic<bool>& stop, HeightStageResult& report,
+                        HeightRange& range) {
     FillRule rule = options.fill;
     rule.integer = plan.integer_heights;
     if (rule.kind == FillRule::Kind::value) rule.value = (rule.value - units.offset_m) / units.scale;
@@ -100,8 +101,7 @@ Result<void> fill_voids(const BuildPlan& plan, const BuildOptions& options, cons
 
 // Where finer layers go on below the dense part.
 struct DeepPart {
-    explicit DeepPart(const BuildPlan& plan)
-        : tree(plan.mosaic.lattice, plan.mosaic.base_lattice().deepest_level) {}
+    explicit DeepPart(const BuildPlan& plan) : tree(plan.mosaic.lattice, plan.mosaic.base_lattice().deepest_level) {}
 
     DeepTree tree;
     std::unique_ptr<HeightGrid> grid;

@@ -117,8 +117,7 @@ Result<void> TexelGround::load(Tile& tile, TileId id) const {
     TileRow row;
     auto found = read_(id, row);
     if (!found) return found.error();
-    if (!*found)
-        return Error{ErrorCode::store, fmt::format("height tile {}/{}/{} is missing", id.level, id.x, id.y)};
+    if (!*found) return Error{ErrorCode::store, fmt::format("height tile {}/{}/{} is missing", id.level, id.x, id.y)};
     auto decoded = decode_height_tile(row.payload, base_.tile_cells_log2, row.codec);
     if (!decoded) return decoded.error();
     tile.present = std::move(decoded->presence);

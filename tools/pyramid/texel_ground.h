@@ -1,5 +1,5 @@
-// Texels meet the heights: alpha where there are none, a tint where there is no imagery. All that is known of the heights
-// comes from the stored tiles, so that neither resuming a build nor updating imagery opens a DEM.
+// Texels meet the heights: alpha where there are none, a tint where there is no imagery. All that is known of the
+// heights comes from the stored tiles, so that neither resuming a build nor updating imagery opens a DEM.
 #pragma once
 
 #include <cstdint>

@@ -81,7 +81,8 @@ private:
         const std::int64_t parts = (extent_.columns + kSampledColumns - 1) / kSampledColumns;
         tbb::parallel_for(std::int64_t{0}, parts, [&](std::int64_t part) {
             const StageClock::Scope clock(Stage::warp);
-            const std::int64_t first = part * kSampledColumns, count = std::min(kSampledColumns, extent_.columns - first);
+            const std::int64_t first = part * kSampledColumns,
+                               count = std::min(kSampledColumns, extent_.columns - first);
             thread_local std::vector<std::uint32_t> values;
             values.resize(static_cast<std::size_t>(count * rows));
             if (auto ok = imagery.sample(extent_.first_column + first, row, count, rows, values); !ok) {

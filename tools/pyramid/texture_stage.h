@@ -1,5 +1,5 @@
-// The texture pyramid of a dataset, piece by piece (docs/resume-and-update.md): districts from the sources, the crown from
-// the seeds.
+// The texture pyramid of a dataset, piece by piece (docs/resume-and-update.md): districts from the sources, the crown
+// from the seeds.
 #pragma once
 
 #include <atomic>

@@ -72,8 +72,8 @@ public:
         return Error{ErrorCode::input,
                      fmt::format("{}: a source of the store, {} in {}: the update must read it where it shows; "
                                  "--sources FOLDER says where it is, --remove {} takes it out",
-                                 record.name, seen ? "is another file now" : "was not found",
-                                 fmt::join(names, ", "), record.name)};
+                                 record.name, seen ? "is another file now" : "was not found", fmt::join(names, ", "),
+                                 record.name)};
     }
 
 private:
@@ -111,8 +111,9 @@ private:
         for (const std::string& name : options_.remove)
             if (std::none_of(dataset().sources.begin(), dataset().sources.end(),
                              [&](const SourceRecord& s) { return s.name == name; }))
-                return Error{ErrorCode::usage,
-                             fmt::format("--remove {}: the store has no source of that name; scree info lists them", name)};
+                return Error{
+                    ErrorCode::usage,
+                    fmt::format("--remove {}: the store has no source of that name; scree info lists them", name)};
         return {};
     }
     const Dataset& dataset() const { return store_->dataset(); }
@@ -171,10 +172,11 @@ private:
         const Dataset &was = dataset(), &is = plan_->dataset;
         std::string what;
         if (!(was.lattice == is.lattice))
-            what = fmt::format("the lattice would be {} x {} cells of {} m from {}, {} instead of {} x {} of {} m from {}, {}",
-                               is.lattice.cells_x, is.lattice.cells_y, is.lattice.spacing_m, is.lattice.origin_x_m,
-                               is.lattice.origin_y_m, was.lattice.cells_x, was.lattice.cells_y, was.lattice.spacing_m,
-                               was.lattice.origin_x_m, was.lattice.origin_y_m);
+            what = fmt::format(
+                "the lattice would be {} x {} cells of {} m from {}, {} instead of {} x {} of {} m from {}, {}",
+                is.lattice.cells_x, is.lattice.cells_y, is.lattice.spacing_m, is.lattice.origin_x_m,
+                is.lattice.origin_y_m, was.lattice.cells_x, was.lattice.cells_y, was.lattice.spacing_m,
+                was.lattice.origin_x_m, was.lattice.origin_y_m);
         else if (was.crs != is.crs)
             what = fmt::format("the CRS would be {} instead of {}", is.crs, was.crs);
         else if (was.texture_deepest_level != is.texture_deepest_level)
@@ -183,7 +185,8 @@ private:
         else if (was.options != is.options)
             what = "its options would be others";
         if (what.empty()) return {};
-        return Error{ErrorCode::usage, fmt::format("{}: {}: every tile would change; use scree build", options_.store, what)};
+        return Error{ErrorCode::usage,
+                     fmt::format("{}: {}: every tile would change; use scree build", options_.store, what)};
     }
 
     Result<void> make() {
@@ -304,8 +307,8 @@ private:
         dirty_.assign(static_cast<std::size_t>(columns_ * rows_), 0);
         report_.districts = columns_ * rows_;
         // The tint's colours span the range of heights.
-        const bool range = dataset_.min_height_m != dataset().min_height_m ||
-                           dataset_.max_height_m != dataset().max_height_m;
+        const bool range =
+            dataset_.min_height_m != dataset().min_height_m || dataset_.max_height_m != dataset().max_height_m;
         // Where depth varies the dense part, which the tint is made of, may have another depth.
         const bool depth = plan_->mosaic.base_shift > 0 || dataset().coarsest_leaf_level;
         const bool all = heights_made_ && (range || depth);
@@ -319,8 +322,8 @@ private:
         return {};
     }
 
-    // Files that came, went or changed; and those whose layer's grid begins elsewhere now, because positions are counted
-    // from there.
+    // Files that came, went or changed; and those whose layer's grid begins elsewhere now, because positions are
+    // counted from there.
     void mark_images() {
         mark_differences(dataset(), plan_->dataset);
         mark_differences(plan_->dataset, dataset());
@@ -330,8 +333,9 @@ private:
         for (const SourceRecord& s : in.sources) {
             if (s.role != kImagery) continue;
             // What the user names is made again, whatever its fingerprint, which is of a part of the file.
-            const bool named = std::find(named_.begin(), named_.end(), s.name) != named_.end() ||
-                               std::find(options_.remove.begin(), options_.remove.end(), s.name) != options_.remove.end();
+            const bool named =
+                std::find(named_.begin(), named_.end(), s.name) != named_.end() ||
+                std::find(options_.remove.begin(), options_.remove.end(), s.name) != options_.remove.end();
             const auto same = std::find_if(other.sources.begin(), other.sources.end(), [&](const SourceRecord& o) {
                 return o.role == s.role && o.name == s.name && o.bytes == s.bytes && o.fingerprint == s.fingerprint;
             });
@@ -351,7 +355,8 @@ private:
             return static_cast<unsigned>(std::strtoul(layer.c_str() + std::min(grid, layer.size()), nullptr, 16));
         };
         const unsigned mine = digits(s.layer), changed = mine ^ digits(other.layer);
-        if (s.layer.compare(0, grid, other.layer, 0, grid) != 0 || (mine & kStraight) == 0 || (changed & kStraight) != 0)
+        if (s.layer.compare(0, grid, other.layer, 0, grid) != 0 || (mine & kStraight) == 0 ||
+            (changed & kStraight) != 0)
             return mark_box(s, *s.box_m);
         if ((changed & kWestSide) != 0) mark_box(s, {west, south, west, north});
         if ((changed & kEastSide) != 0) mark_box(s, {east, south, east, north});
@@ -380,7 +385,9 @@ private:
             const TileId id = *tile_from_key(l, key);
             if (id.level < plan_->mosaic.base_lattice().deepest_level) return {};
             const double side = static_cast<double>(l.tile_extent(id.level)) * texels_a_cell;
-            const auto at = [&](std::int64_t tile) { return static_cast<std::int64_t>(static_cast<double>(tile) * side); };
+            const auto at = [&](std::int64_t tile) {
+                return static_cast<std::int64_t>(static_cast<double>(tile) * side);
+            };
             mark({at(id.x), at(id.y), at(id.x + 1) + 1, at(id.y + 1) + 1});
             return {};
         });
@@ -389,7 +396,8 @@ private:
     // Visits (key, stored now?) of the height tiles that are not as they were.
     Result<void> for_each_changed_height(const std::function<Result<void>(std::int64_t key, bool stored)>& visit) {
         std::vector<std::int64_t> now, was;
-        if (auto ok = side_->for_each_key(TileKind::height, [&](std::int64_t key) { now.push_back(key); }); !ok) return ok;
+        if (auto ok = side_->for_each_key(TileKind::height, [&](std::int64_t key) { now.push_back(key); }); !ok)
+            return ok;
         TileRow fresh, held;
         for (const std::int64_t key : now) {
             auto read = writer_->read(TileKind::height, key, fresh);
@@ -440,8 +448,7 @@ private:
                                           });
             !ok)
             return ok;
-        std::int64_t& written =
-            kind == TileKind::height ? report_.height_tiles_written : report_.texture_tiles_written;
+        std::int64_t& written = kind == TileKind::height ? report_.height_tiles_written : report_.texture_tiles_written;
         TileRow fresh, held;
         for (const std::int64_t key : made) {
             auto read = side_->read(kind, key, fresh);

@@ -31,8 +31,8 @@ struct UpdateReport {
 };
 
 /// The store is the old one until it is the new one, in one transaction; readers go on. Errors: ErrorCode::input for a
-/// source that is not found; ErrorCode::usage where every tile would change (another lattice, depth or CRS) or the store
-/// does not know its options.
+/// source that is not found; ErrorCode::usage where every tile would change (another lattice, depth or CRS) or the
+/// store does not know its options.
 Result<UpdateReport> update_store(const UpdateOptions& options, const std::atomic<bool>& stop);
 
 }  // namespace scree
