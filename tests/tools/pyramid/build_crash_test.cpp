@@ -138,6 +138,7 @@ protected:
         EXPECT_TRUE(!named || digest_of(out_) == digest) << "what has the final name is not whole";
         ++tally.faults;
         ++(disturbed ? tally.survived : tally.reported);
+        if (disturbed) tally.resumed += disturbed->reused_tiles > 0 ? 1 : 0;
         if (named) return;
         const auto again = build();
         ASSERT_TRUE(again.ok()) << again.error().message;
