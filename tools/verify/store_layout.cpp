@@ -203,7 +203,11 @@ Result<void> check_seed_count(const SqliteStore& store, int level, std::int64_t 
     if (!db) return db.error();
     auto tables = db->integer("SELECT count(*) FROM sqlite_master WHERE name = 'seed'");
     if (!tables) return tables.error();
-    if (*tables == 0) return {};
+    // A store that no update can go on from needs none.
+    const std::vector<SourceRecord>& sources = store.dataset().sources;
+    const bool for_updates =
+        std::any_of(sources.begin(), sources.end(), [](const SourceRecord& s) { return s.box_m.has_value(); });
+    if (*tables == 0 || (seeds == 0 && !for_updates)) return {};
     const Lattice& l = store.dataset().lattice;
     const std::int64_t first = (std::int64_t{1} << (2 * level)) * l.root_rows * l.root_columns;
     auto textures =
