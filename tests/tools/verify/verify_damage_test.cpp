@@ -8,6 +8,7 @@
 #include <functional>
 
 #include "common/store/height_codec.h"
+#include "common/store/seed_codec.h"
 #include "common/store/sqlite_store.h"
 #include "tests/common/test_support.h"
 #include "tests/tools/verify/small_store.h"
@@ -314,17 +315,25 @@ TEST(VerifyDamage, AStoreWithoutATableOfSeedsIsOne) {
 
 TEST(VerifyDamage, Seeds) {
     test::SmallTerrain terrain = kTerrain;
-    terrain.texture_deepest_level = 4;
-    const auto row = [](std::int64_t key) {
-        const std::vector<std::uint8_t> payload{1};
-        return fmt::format("INSERT INTO seed VALUES({}, 0, {}, x'01')", key,
-                           static_cast<std::int64_t>(row_checksum(static_cast<int>(TileKind::seed), key, 0, payload)));
+    terrain.texture_deepest_level = 5;
+    const int size = 1 << terrain.texture_size_log2;
+    const std::vector<std::uint8_t> pixels(static_cast<std::size_t>(size * size) * 4, 200);
+    const auto good = encode_seed(pixels.data(), static_cast<std::size_t>(size) * 4, size);
+    const auto row = [&](std::int64_t key, const std::vector<std::uint8_t>& payload) {
+        std::string bytes;
+        for (const std::uint8_t b : payload) bytes += fmt::format("{:02x}", b);
+        return fmt::format("INSERT INTO seed VALUES({}, 1, {}, x'{}')", key,
+                           static_cast<std::int64_t>(row_checksum(static_cast<int>(TileKind::seed), key, 1, payload)),
+                           bytes);
     };
-    const VerifyReport sound = verify_after({}, row(2), terrain);
-    for (const char* text : {"seed 0/0/0", "seed level", "checksum", "key"}) EXPECT_FALSE(names(sound, text));
-    EXPECT_TRUE(names(verify_after({}, row(2) + "; UPDATE seed SET payload = x'02'", terrain), "seed 0/0/0: checksum"));
-    EXPECT_TRUE(names(verify_after({}, row(8), terrain), "seed 1/0/0 is not of the seed level 0"));
-    EXPECT_TRUE(names(verify_after({}, row(0), terrain), "table 'seed': 0 is no key of this lattice"));
+    const VerifyReport one = verify_after({}, row(8, good), terrain);
+    for (const char* text : {"seed 1/0/0", "seed level", "checksum", "key"}) EXPECT_FALSE(names(one, text));
+    EXPECT_TRUE(names(one, "table 'seed': 1 rows for "));
+    EXPECT_TRUE(
+        names(verify_after({}, row(8, good) + "; UPDATE seed SET payload = x'02'", terrain), "seed 1/0/0: checksum"));
+    EXPECT_TRUE(names(verify_after({}, row(8, {3, 1, 2}), terrain), "seed 1/0/0: seed: compressed part"));
+    EXPECT_TRUE(names(verify_after({}, row(32, good), terrain), "seed 2/0/0 is not of the seed level 1"));
+    EXPECT_TRUE(names(verify_after({}, row(0, good), terrain), "table 'seed': 0 is no key of this lattice"));
 }
 
 TEST(VerifyDamage, AViewInPlaceOfATableIsNotQueriedAtAll) {
