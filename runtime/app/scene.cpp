@@ -415,8 +415,10 @@ Result<bool> Scene::step_to_update() {
 }
 
 Result<SceneFrame> Scene::complete(std::span<const Camera> views, const std::function<bool()>& stop) {
+    // A tile that has just been evicted for another is refused for so many frames (TileCache::kWantedBack).
+    constexpr int kMostIdleRounds = static_cast<int>(TileCache::kIdleFrames) + 3;
     std::int64_t uploads = 0;
-    for (int idle_rounds = 0; idle_rounds < 3;) {
+    for (int idle_rounds = 0; idle_rounds < kMostIdleRounds;) {
         while (pager_->taking_over() || pager_->stale()) {
             if (stop && stop()) return Error{ErrorCode::interrupted, "stopped"};
             auto taken_up = step_to_update();

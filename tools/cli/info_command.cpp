@@ -102,6 +102,7 @@ int run_info(int argc, char** argv) {
         for (const SourceRecord& s : d.sources)
             fmt::print("  source     {} ({}, {} x {}, {} bytes{}{})\n", s.name, s.role, s.width, s.height, s.bytes,
                        s.fingerprint.empty() ? "" : ", fingerprint ", s.fingerprint);
+        for (const auto& [name, value] : d.options) fmt::print("  option     --{} {}\n", name, value);
         if (!d.attribution.empty()) fmt::print("  credit     {}\n", d.attribution);
         if (!digest.empty()) fmt::print("  digest     {}\n", digest);
     }
@@ -134,6 +135,7 @@ int run_info(int argc, char** argv) {
         {"texture_size", d.texture_size()},
         {"texel_m", d.texel_m(d.texture_deepest_level)},
         {"has_imagery", d.has_imagery},
+        {"options", d.options},
         {"height_quantum_m", d.height_quantum_m},
         {"height_quantum_error_m", d.height_quantum_error_m},
         {"warp_error_m", d.warp_error_m},
