@@ -46,9 +46,9 @@ public:
     const BisectionVertex& vertex(std::int32_t index) const { return vertices_[static_cast<std::size_t>(index)]; }
     /// 1 <= level <= levels().
     std::span<const std::int32_t> of_level(int level) const {
-        return std::span(order_).subspan(first_[static_cast<std::size_t>(level)],
-                                         first_[static_cast<std::size_t>(level) + 1] -
-                                             first_[static_cast<std::size_t>(level)]);
+        return std::span(order_).subspan(
+            first_[static_cast<std::size_t>(level)],
+            first_[static_cast<std::size_t>(level) + 1] - first_[static_cast<std::size_t>(level)]);
     }
     /// All vertices but the corners, coarsest first.
     std::span<const std::int32_t> coarse_to_fine() const { return order_; }

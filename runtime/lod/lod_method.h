@@ -16,8 +16,8 @@ enum class LodMethod {
 };
 enum class ErrorMetric {
     guaranteed,  ///< G2 of geomip, N*K of rsg, BSK of block-rsg: nothing drawn is further than tau from the finest data
-    uc,          ///< rsg: each vertex by its own level's correction, as if on the optical axis (Ueng & Chuang). No bound
-    deboer       ///< geomip: distance to the tile's centre, correction from level to level (de Boer). No bound
+    uc,     ///< rsg: each vertex by its own level's correction, as if on the optical axis (Ueng & Chuang). No bound
+    deboer  ///< geomip: distance to the tile's centre, correction from level to level (de Boer). No bound
 };
 enum class ReuseTest {
     off,    ///< every frame from scratch

@@ -30,7 +30,7 @@ bool reuse_t1(const EyeToBox& then, const EyeToBox& now, double moved_m, const R
 bool reuse_t2(const EyeToBox& now, double moved_m, const ReuseAllowance& allowance);
 /// T3, floored metric max(h, c r) / r^2: |e1 - e0| <= H0 + H1 - 2 sqrt(H0 H1 / q), H = max(level, c distance).
 bool reuse_t3(const EyeToBox& then, const EyeToBox& now, double moved_m, double c, const ReuseAllowance& allowance);
-/// T1, or T3 where the metric has a floor c > 0.
+/// T1, or T3 where the metric has a floor c > 0: what passed the floored test passed the other as well.
 bool reuse_exact(const EyeToBox& then, const EyeToBox& now, double moved_m, double c, const ReuseAllowance& allowance);
 
 /// P1 of Ueng & Chuang: the greatest change of the allowed correction over the block's four corner vertices is less

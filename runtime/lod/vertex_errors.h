@@ -11,8 +11,8 @@ namespace scree {
 /// delta(v) = |z(v) - (z(a) + z(b)) / 2|, a and b the ends of its hypotenuse; 0 for corners. Sizes: vertex_count().
 void local_corrections(const Bisection& bisection, std::span<const double> z, std::span<float> delta);
 
-/// E(v): greatest vertical distance of the block's own vertices from the one or two triangles that are split at v; exact
-/// but for rounding up to float. Not saturated. 0 for corners. z finite.
+/// E(v): greatest vertical distance of the block's own vertices from the one or two triangles that are split at v;
+/// exact but for rounding up to float. Not saturated. 0 for corners. z finite.
 void dropped_errors(const Bisection& bisection, std::span<const double> z, std::span<float> error);
 
 /// rho(v): distance from v to the furthest of its hypotenuse's ends and the apexes, in space, rounded up. `reach_m` is
@@ -20,8 +20,8 @@ void dropped_errors(const Bisection& bisection, std::span<const double> z, std::
 void diamond_radii(const Bisection& bisection, std::span<const double> z, double spacing_m, double reach_m,
                    std::span<float> radius);
 
-/// Makes both monotone up the hierarchy: E(v) = max over its children's E; rho(v) >= |v - c| + rho(c), rounded up. After
-/// this whatever selects a vertex selects its parents (N*: Scree lod, 1.4).
+/// Makes both monotone up the hierarchy: E(v) = max over its children's E; rho(v) >= |v - c| + rho(c), rounded up.
+/// After this whatever selects a vertex selects its parents (N*: Scree lod, 1.4).
 void saturate(const Bisection& bisection, std::span<const double> z, double spacing_m, std::span<float> error,
               std::span<float> radius);
 
