@@ -6,6 +6,26 @@
 
 namespace scree {
 
+bool add_closed(const Bisection& bisection, std::int32_t vertex, std::uint8_t* active) {
+    if (active[vertex] != 0) return false;
+    active[vertex] = 1;
+    for (const std::int32_t parent : bisection.vertex(vertex).parents)
+        if (parent >= 0) add_closed(bisection, parent, active);
+    return true;
+}
+
+std::uint32_t* emit_triangles(const Bisection& bisection, const std::uint8_t* active, const BisectionTriangle& triangle,
+                              int level, std::uint32_t* out) {
+    if (level <= bisection.levels() && active[triangle.middle()] != 0) {
+        out = emit_triangles(bisection, active, triangle.left_half(), level + 1, out);
+        return emit_triangles(bisection, active, triangle.right_half(), level + 1, out);
+    }
+    *out++ = static_cast<std::uint32_t>(triangle.apex);
+    *out++ = static_cast<std::uint32_t>(triangle.left);
+    *out++ = static_cast<std::uint32_t>(triangle.right);
+    return out;
+}
+
 BlockSelection::BlockSelection(const Bisection& bisection)
     : bisection_(&bisection), active_(bisection.vertex_count()), lock_(bisection.vertex_count()) {
     clear();
@@ -28,32 +48,21 @@ void BlockSelection::set(std::int32_t vertex, bool active) {
     }
 }
 
-void BlockSelection::add(std::int32_t vertex) {
-    if (vertex < 0 || is_active(vertex)) return;
-    active_[static_cast<std::size_t>(vertex)] = 1;
-    for (const std::int32_t parent : bisection_->vertex(vertex).parents) add(parent);
-}
+void BlockSelection::add(std::int32_t vertex) { add_closed(*bisection_, vertex, active_.data()); }
 
-void BlockSelection::emit(std::vector<std::uint32_t>& indices) const {
-    for (const BisectionTriangle& root : bisection_->roots()) emit(root, 1, indices);
-}
+void BlockSelection::emit(std::vector<std::uint32_t>& indices) const { emit(bisection_->roots(), 1, indices); }
 
 void BlockSelection::emit(int stride_log2, int x, int y, std::vector<std::uint32_t>& indices) const {
-    const int level = 2 * (bisection_->cells_log2() - stride_log2) + 1;
-    for (const BisectionTriangle& root : bisection_->roots(stride_log2, x, y)) emit(root, level, indices);
+    emit(bisection_->roots(stride_log2, x, y), 2 * (bisection_->cells_log2() - stride_log2) + 1, indices);
 }
 
-void BlockSelection::emit(const BisectionTriangle& t, int level, std::vector<std::uint32_t>& indices) const {
-    if (level <= bisection_->levels() && is_active(t.middle())) {
-        emit(t.left_half(), level + 1, indices);
-        emit(t.right_half(), level + 1, indices);
-        return;
-    }
-    const std::size_t at = indices.size();
-    indices.resize(at + 3);
-    indices[at] = static_cast<std::uint32_t>(t.apex);
-    indices[at + 1] = static_cast<std::uint32_t>(t.left);
-    indices[at + 2] = static_cast<std::uint32_t>(t.right);
+void BlockSelection::emit(std::span<const BisectionTriangle> triangles, int level,
+                          std::vector<std::uint32_t>& indices) const {
+    const std::size_t before = indices.size();
+    indices.resize(before + most_indices(*bisection_));
+    std::uint32_t* out = indices.data() + before;
+    for (const BisectionTriangle& t : triangles) out = emit_triangles(*bisection_, active_.data(), t, level, out);
+    indices.resize(static_cast<std::size_t>(out - indices.data()));
 }
 
 std::int64_t BlockSelection::triangles() const {

@@ -247,8 +247,8 @@ Selector::Selector(const Dataset& dataset) : impl_(std::make_unique<Impl>(datase
 Selector::~Selector() = default;
 Selector::Selector(Selector&&) noexcept = default;
 
-const Selection& Selector::select(std::span<const Camera> cameras, const SelectionSettings& settings,
-                                  const Residency& residency) {
+Selection& Selector::select(std::span<const Camera> cameras, const SelectionSettings& settings,
+                            const Residency& residency) {
     assert(cameras.size() <= kMaxViews);
     Impl& s = *impl_;
     s.clear(cameras.size());

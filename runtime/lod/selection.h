@@ -69,8 +69,7 @@ public:
 
     /// The result is valid until the next call. A root that is not resident is taken for one that is not stored: the
     /// pager pins them. At most kMaxViews views.
-    const Selection& select(std::span<const Camera> views, const SelectionSettings& settings,
-                            const Residency& residency);
+    Selection& select(std::span<const Camera> views, const SelectionSettings& settings, const Residency& residency);
 
 private:
     struct Impl;

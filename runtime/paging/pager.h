@@ -29,6 +29,8 @@ struct PagerOptions {
     int loader_threads = 2;
     int latency_ms = 0;    ///< every read is delayed by this: to try slow disks
     bool textures = true;  ///< false: heights alone (audit)
+    /// Where there is one, the sink gets what it finds out about every height tile.
+    std::shared_ptr<const TileMeasure> measure;
 };
 
 struct PagerCounters {

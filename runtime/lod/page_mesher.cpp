@@ -1,0 +1,707 @@
+#include "runtime/lod/page_mesher.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <vector>
+
+#include "runtime/lod/block_selection.h"
+#include "runtime/lod/cut.h"
+#include "runtime/lod/page_measure.h"
+#include "runtime/lod/reuse.h"
+#include "runtime/lod/vertex_metric.h"
+
+namespace scree {
+namespace {
+
+/// Floor c of the metric max(h, c r) / r^2: reuse straight above a tile for a few triangles more (Scree lod, T3).
+constexpr double kMetricFloor = 0.3;
+/// Rungs of block thresholds an octave: 4 costs 9 % of triangles on average; fewer cost more, more are left sooner.
+constexpr double kRungsPerOctave = 4;
+constexpr int kNoRung = std::numeric_limits<int>::min();
+constexpr int kLeastRung = kNoRung + 1;  ///< threshold 0: whatever has an error at all
+/// Where meshes do not fit into the pool the tolerance grows by eighths of an octave.
+constexpr double kCoarsening = 1.0905077326652577;
+constexpr int kMostCoarsening = 400;
+/// Eyes kept of a tile's last choice; with more views nothing is reused.
+constexpr std::size_t kMostEyes = 4;
+/// Indices a height slot in the pool, of the 3 * 2 * m^2 of a tile with nothing dropped.
+constexpr std::size_t kPoolShare = 4;
+
+// Sides by Direction: the place of the k-th sample along a side, and the neighbour's opposite side.
+constexpr std::int32_t side_index(int side, int k, int m) {
+    const int row = m + 1;
+    switch (side) {
+        case 0: return k;
+        case 1: return k * row + m;
+        case 2: return m * row + k;
+        default: return k * row;
+    }
+}
+constexpr int opposite(int side) { return (side + 2) % 4; }
+TileId beside(TileId id, int side) {
+    switch (side) {
+        case 0: return {id.level, id.x, id.y - 1};
+        case 1: return {id.level, id.x + 1, id.y};
+        case 2: return {id.level, id.x, id.y + 1};
+        default: return {id.level, id.x - 1, id.y};
+    }
+}
+
+// Where the vertices of a mesh were chosen for.
+struct Chosen {
+    bool valid = false;
+    std::int32_t geomip = -1;
+    std::uint32_t edge_mask = 0;
+    std::int32_t part_level = 0;
+    std::uint32_t seen_by = 0;
+    int rung = kNoRung;
+    double tau_px = 0, half_curvature = 0;
+    std::array<double, kMostEyes> error_px{};
+    std::array<glm::dvec3, kMostEyes> eyes{};
+};
+
+// What is kept of a height slot.
+struct SlotState {
+    Chosen chosen;
+    MeshRange mesh;          ///< of `drawn`
+    bool drawn_valid = false;
+    std::int32_t drawn_parts = -1;
+    TileId id;
+};
+
+// A tile drawn in this frame.
+struct Drawn {
+    const DrawItem* item = nullptr;
+    std::int32_t slot = 0;
+    std::uint32_t seen_by = 0;
+    std::int32_t part_level = 0;  ///< the finest part that it is drawn in
+    double base_error_m = 0;
+    Box box;
+    std::int64_t views = 0;
+};
+
+struct Link {
+    std::int32_t fine = 0, coarse = 0;  ///< tiles; `fine` is the smaller page or one as large
+    std::int32_t fine_first = 0, fine_step = 0, coarse_first = 0, coarse_step = 0, count = 0;  ///< shared vertices
+};
+
+// Tiles of a frame by name: open addressing, kept from frame to frame.
+class TileIndex {
+public:
+    void reset(std::size_t tiles) {
+        std::size_t size = 64;
+        while (size < 2 * tiles) size *= 2;
+        if (slots_.size() < size) slots_.resize(size);
+        std::fill(slots_.begin(), slots_.end(), std::pair{TileId{}, -1});
+    }
+    void add(TileId id, std::int32_t index) {
+        std::size_t at = place(id);
+        while (slots_[at].second >= 0) at = (at + 1) & (slots_.size() - 1);
+        slots_[at] = {id, index};
+    }
+    std::int32_t find(TileId id) const {
+        for (std::size_t at = place(id); slots_[at].second >= 0; at = (at + 1) & (slots_.size() - 1))
+            if (slots_[at].first == id) return slots_[at].second;
+        return -1;
+    }
+
+private:
+    std::size_t place(TileId id) const { return TileIdHash{}(id) & (slots_.size() - 1); }
+    std::vector<std::pair<TileId, std::int32_t>> slots_;
+};
+
+// One view on one tile: the sight of its vertices.
+struct TileSight {
+    double west = 0, north = 0;  ///< of the eye from the tile's corner, samples; south positive
+    double spacing_m = 1, eye_z = 0;
+    double error_px = 0, tau_px = 1, half_curvature = 0, base_m = 0;
+};
+
+}  // namespace
+
+struct PageMesher::Impl {
+    Impl(const Dataset& d, const LodSettings& settings, std::int64_t height_slots)
+        : dataset(d),
+          lod(settings),
+          n(d.lattice.tile_cells_log2),
+          m(1 << n),
+          vertices(slot_vertex_count(n)),
+          bisections{Bisection(n, false), Bisection(n, true)},
+          states(static_cast<std::size_t>(height_slots)),
+          heights(states.size() * vertices),
+          costs(states.size() * vertices),
+          chosen(states.size() * vertices),
+          drawn_sets(states.size() * vertices),
+          pool(states.size() * most_indices(bisections[0]) / kPoolShare, most_indices(bisections[0])),
+          buffer(most_indices(bisections[0])) {
+        columns.resize(vertices);
+        rows.resize(vertices);
+        half_bases.resize(static_cast<std::size_t>(2 * n) + 1);
+        for (std::size_t v = 0; v < vertices; ++v) {
+            columns[v] = static_cast<double>(static_cast<int>(v) % (m + 1));
+            rows[v] = static_cast<double>(static_cast<int>(v) / (m + 1));
+        }
+        // Half a hypotenuse of level k, squared, in samples: m^2 / 2 for the tile, half of that a level.
+        for (int level = 1; level <= 2 * n; ++level)
+            half_bases[static_cast<std::size_t>(level)] = 0.5 * m * m / std::exp2(level - 1);
+    }
+
+    const Dataset& dataset;
+    LodSettings lod;
+    int n, m;
+    std::size_t vertices;
+    std::array<Bisection, 2> bisections;
+    std::vector<SlotState> states;
+    // By slot, an entry a vertex.
+    std::vector<float> heights;  ///< quanta
+    std::vector<VertexCost> costs;
+    std::vector<std::uint8_t> chosen;      ///< selected for the tile's own sake
+    std::vector<std::uint8_t> drawn_sets;  ///< and with what neighbours add
+    MeshPool pool;
+    std::vector<std::uint32_t> buffer;
+    std::vector<double> columns, rows, half_bases;
+    MeshCounters counters;
+    // Of the frame.
+    std::vector<Drawn> tiles;
+    std::vector<std::int32_t> tile_of_slot;
+    TileIndex index;
+    std::vector<Link> links;
+    std::vector<std::int32_t> first_link, links_of;
+    std::vector<std::uint8_t> sets;  ///< by tile: what is drawn
+    std::vector<std::int32_t> queue;
+    std::vector<std::uint8_t> queued;
+
+    const Bisection& bisection_of(TileId id) const { return bisections[static_cast<std::size_t>((id.x + id.y) & 1)]; }
+    std::size_t at(std::int32_t slot) const { return static_cast<std::size_t>(slot) * vertices; }
+    std::uint8_t* set_of(std::size_t tile) { return sets.data() + tile * vertices; }
+
+    void put(std::int32_t slot, std::span<const SlotVertex> from, std::span<const VertexCost> cost) {
+        assert(from.size() == vertices && cost.size() == vertices);
+        for (std::size_t k = 0; k < vertices; ++k) heights[at(slot) + k] = from[k].height_n;
+        std::copy(cost.begin(), cost.end(), costs.begin() + static_cast<std::ptrdiff_t>(at(slot)));
+        states[static_cast<std::size_t>(slot)] = {};
+    }
+
+    // --- the frame's tiles -------------------------------------------------------------------------------------
+
+    void gather(std::span<const Camera> views, double half_curvature, const Residency& residency,
+                const Selection& selection) {
+        tiles.clear();
+        tile_of_slot.assign(states.size(), -1);
+        for (std::size_t v = 0; v < selection.draws.size(); ++v)
+            for (const DrawItem& item : selection.draws[v]) {
+                std::int32_t& tile = tile_of_slot[static_cast<std::size_t>(item.height_slot)];
+                if (tile < 0) {
+                    tile = static_cast<std::int32_t>(tiles.size());
+                    tiles.push_back({});
+                    Drawn& drawn = tiles.back();
+                    drawn.item = &item;
+                    drawn.slot = item.height_slot;
+                    const auto& header = residency.heights.headers[static_cast<std::size_t>(item.height_slot)];
+                    drawn.base_error_m = base_error_m(dataset, header);
+                    drawn.box = box_of(item.tile, header.own);
+                }
+                tiles[static_cast<std::size_t>(tile)].seen_by |= 1u << v;
+                ++tiles[static_cast<std::size_t>(tile)].views;
+            }
+        for (const DrawList& list : selection.parts)
+            for (const DrawItem& item : list) {
+                Drawn& tile = tiles[static_cast<std::size_t>(
+                    tile_of_slot[static_cast<std::size_t>(item.height_slot)])];
+                tile.part_level = std::max(tile.part_level, item.part.level);
+            }
+        if (half_curvature > 0 && !views.empty())
+            for (Drawn& tile : tiles) {
+                Box low = tile.box;
+                for (const Camera& view : views) {
+                    const Box lowered = lowered_by_curvature(tile.box, view.eye, half_curvature);
+                    low.low.z = std::min(low.low.z, lowered.low.z);
+                }
+                tile.box = low;
+            }
+    }
+
+    Box box_of(TileId id, const HeightBounds& bounds) const {
+        const Lattice& l = dataset.lattice;
+        const LatticePoint corner = l.corner(id);
+        const auto west = static_cast<double>(corner.i), north = static_cast<double>(corner.j),
+                   extent = static_cast<double>(l.tile_extent(id.level));
+        return {{l.x_m(west), l.y_m(north + extent), dataset.height_m(bounds.min_n)},
+                {l.x_m(west + extent), l.y_m(north), dataset.height_m(bounds.max_n)}};
+    }
+
+    // --- the choice of a tile's own vertices -------------------------------------------------------------------
+
+    // Vertices that the tile may be drawn with: not below its stride, not those that thinned edges lack.
+    bool may_have(const DrawItem& item, std::int32_t v, int level) const {
+        const int finest = 2 * (n - item.geomip);
+        if (level > finest) return false;
+        if (item.edge_mask == 0 || level != finest) return true;
+        const int i = v % (m + 1), j = v / (m + 1);
+        return !(((item.edge_mask & kEdgeNorth) != 0 && j == 0) || ((item.edge_mask & kEdgeEast) != 0 && i == m) ||
+                 ((item.edge_mask & kEdgeSouth) != 0 && j == m) || ((item.edge_mask & kEdgeWest) != 0 && i == 0));
+    }
+
+    template <class Selects>
+    void refine(const Bisection& b, const DrawItem& item, const BisectionTriangle& t, int level, std::uint8_t* active,
+                const Selects& selects) {
+        const std::int32_t v = t.middle();
+        if (level > 2 * (n - item.geomip)) return;
+        if (active[v] == 0) {
+            if (!may_have(item, v, level) || !selects(v, level)) return;
+            active[v] = 1;
+        }
+        refine(b, item, t.left_half(), level + 1, active, selects);
+        refine(b, item, t.right_half(), level + 1, active, selects);
+    }
+
+    void start_set(const Bisection& b, std::uint8_t* active) const {
+        std::memset(active, 0, vertices);
+        for (const int j : {0, m})
+            for (const int i : {0, m}) active[b.index(i, j)] = 1;
+    }
+
+    TileSight sight_of(const Drawn& tile, const Camera& view, const MeshSettings& s) const {
+        const Lattice& l = dataset.lattice;
+        const TileId id = tile.item->tile;
+        const LatticePoint corner = l.corner(id);
+        TileSight sight;
+        sight.spacing_m = l.spacing_m * static_cast<double>(l.step(id.level));
+        sight.west = (view.eye.x - l.x_m(static_cast<double>(corner.i))) / sight.spacing_m;
+        sight.north = (l.y_m(static_cast<double>(corner.j)) - view.eye.y) / sight.spacing_m;
+        sight.eye_z = view.eye.z;
+        sight.error_px = view.focal_px() * (lod.metric == ErrorMetric::uc ? 1 : view.off_axis_factor());
+        sight.tau_px = s.tau_px;
+        sight.half_curvature = s.half_curvature;
+        sight.base_m = tile.base_error_m;
+        return sight;
+    }
+
+    Sight<double> see(const TileSight& s, std::size_t slot_at, std::int32_t v) const {
+        const auto k = static_cast<std::size_t>(v);
+        const double dx = columns[k] - s.west, dy = rows[k] - s.north;
+        const double h2 = (dx * dx + dy * dy) * s.spacing_m * s.spacing_m;
+        const double z = dataset.height_offset_m +
+                         static_cast<double>(heights[slot_at + k]) * dataset.height_quantum_m - h2 * s.half_curvature;
+        const double dz = z - s.eye_z;
+        return {h2, dz * dz};
+    }
+
+    // N*K with what the tile itself is off by, and with what flat triangles miss of the earth's curvature: no more than
+    // half of it at the middle of a hypotenuse 2 l long, l^2 / 2R.
+    bool guaranteed(const TileSight& s, std::size_t slot_at, std::int32_t v, int level) const {
+        const VertexCost& cost = costs[slot_at + static_cast<std::size_t>(v)];
+        const double bulge =
+            half_bases[static_cast<std::size_t>(level)] * s.spacing_m * s.spacing_m * s.half_curvature;
+        const double error_m = static_cast<double>(cost.error_m) + bulge;
+        if (!(error_m > 0)) return false;
+        const Sight<double> sight = see(s, slot_at, v);
+        double radius = static_cast<double>(cost.radius_m);
+        // Curvature lowers the ball's points by other amounts than its centre.
+        if (s.half_curvature > 0) radius *= 1 + (2 * std::sqrt(sight.h2) + radius) * s.half_curvature;
+        return guaranteed_selects(s.error_px * (error_m + s.base_m), radius, kMetricFloor, s.tau_px, sight);
+    }
+
+    void choose_guaranteed(const Drawn& tile, std::span<const TileSight> sights, std::uint8_t* active) {
+        const Bisection& b = bisection_of(tile.item->tile);
+        const std::size_t slot_at = at(tile.slot);
+        for (const BisectionTriangle& root : b.roots())
+            refine(b, *tile.item, root, 1, active, [&](std::int32_t v, int level) {
+                return std::any_of(sights.begin(), sights.end(),
+                                   [&](const TileSight& s) { return guaranteed(s, slot_at, v, level); });
+            });
+    }
+
+    // Ueng & Chuang: active and lock, finest first. What is locked is what an active child has marked.
+    void choose_uc(const Drawn& tile, std::span<const TileSight> sights, std::uint8_t* active) {
+        const Bisection& b = bisection_of(tile.item->tile);
+        const std::size_t slot_at = at(tile.slot);
+        const auto order = b.coarse_to_fine();
+        for (std::size_t k = order.size(); k-- > 0;) {
+            const std::int32_t v = order[k];
+            const BisectionVertex& vertex = b.vertex(v);
+            if (!may_have(*tile.item, v, vertex.level)) continue;
+            const double delta = static_cast<double>(costs[slot_at + static_cast<std::size_t>(v)].error_m);
+            const bool want = active[v] != 0 || std::any_of(sights.begin(), sights.end(), [&](const TileSight& s) {
+                                  return uc_selects(s.error_px * delta, s.tau_px, see(s, slot_at, v));
+                              });
+            if (!want) continue;
+            active[v] = 1;
+            for (const std::int32_t parent : vertex.parents)
+                if (parent >= 0) active[parent] = 1;
+        }
+    }
+
+    void choose_block(const Drawn& tile, double threshold_m, double half_curvature, std::uint8_t* active) {
+        const Bisection& b = bisection_of(tile.item->tile);
+        const std::size_t slot_at = at(tile.slot);
+        const double spacing_m =
+            dataset.lattice.spacing_m * static_cast<double>(dataset.lattice.step(tile.item->tile.level));
+        const double bulge = spacing_m * spacing_m * half_curvature;
+        for (const BisectionTriangle& root : b.roots())
+            refine(b, *tile.item, root, 1, active, [&](std::int32_t v, int level) {
+                return static_cast<double>(costs[slot_at + static_cast<std::size_t>(v)].error_m) +
+                           bulge * half_bases[static_cast<std::size_t>(level)] >
+                       threshold_m;
+            });
+    }
+
+    // The rung of a tile: what it may err by, over the views that see it.
+    int rung_of(const Drawn& tile, std::span<const Camera> views, double tau_px) const {
+        double threshold_m = std::numeric_limits<double>::infinity();
+        for (std::size_t v = 0; v < views.size(); ++v) {
+            if ((tile.seen_by >> v & 1) == 0) continue;
+            const Camera& view = views[v];
+            const double distance_m = std::max(distance_to_box(view.eye, tile.box), view.near_m);
+            threshold_m = std::min(threshold_m, tau_px * distance_m / (view.focal_px() * view.off_axis_factor()));
+        }
+        threshold_m -= tile.base_error_m;
+        if (!(threshold_m > 0)) return kLeastRung;
+        return static_cast<int>(std::floor(kRungsPerOctave * std::log2(threshold_m)));
+    }
+    static double threshold_of(int rung) { return rung == kLeastRung ? 0 : std::exp2(rung / kRungsPerOctave); }
+
+    bool same_shape(const Chosen& c, const Drawn& tile, const MeshSettings& s) const {
+        return c.valid && c.geomip == tile.item->geomip && c.edge_mask == tile.item->edge_mask &&
+               c.part_level == tile.part_level && c.half_curvature == s.half_curvature;
+    }
+
+    bool may_reuse(const Chosen& c, const Drawn& tile, std::span<const Camera> views, const MeshSettings& s) const {
+        if (lod.reuse == ReuseTest::off || !same_shape(c, tile, s) || views.size() > kMostEyes) return false;
+        if (c.tau_px != s.tau_px || (tile.seen_by & ~c.seen_by) != 0) return false;
+        for (std::size_t v = 0; v < views.size(); ++v) {
+            if ((tile.seen_by >> v & 1) == 0) continue;
+            if (!may_reuse(c.eyes[v], c.error_px[v], tile, views[v], s)) return false;
+        }
+        return true;
+    }
+
+    bool may_reuse(const glm::dvec3& then, double error_px, const Drawn& tile, const Camera& view,
+                   const MeshSettings& s) const {
+        const double now_px = view.focal_px() * view.off_axis_factor();
+        if (now_px > error_px) return false;
+        if (lod.reuse == ReuseTest::paper) return reuse_p1(then, view.eye, corners_of(tile), tile.box, view.focal_px(),
+                                                           lod.s_px, s.tau_px);
+        const EyeToBox before = eye_to_box(then, tile.box), after = eye_to_box(view.eye, tile.box);
+        double moved_m = glm::length(view.eye - then);
+        // Relative to the eye, a point over a curved earth moves by more than the eye does.
+        if (s.half_curvature > 0) {
+            const double furthest_m = std::max(before.level_m, after.level_m) +
+                                      std::hypot(tile.box.high.x - tile.box.low.x, tile.box.high.y - tile.box.low.y);
+            moved_m *= 1 + (2 * furthest_m + moved_m) * s.half_curvature;
+        }
+        return reuse_exact(before, after, moved_m, kMetricFloor, {s.tau_px, lod.s_px});
+    }
+
+    std::array<glm::dvec3, 4> corners_of(const Drawn& tile) const {
+        const auto z = [&](int i, int j) {
+            return dataset.height_offset_m + dataset.height_quantum_m *
+                                                 static_cast<double>(heights[at(tile.slot) + static_cast<std::size_t>(
+                                                                                                 j * (m + 1) + i)]);
+        };
+        const Box& box = tile.box;
+        return {{{box.low.x, box.high.y, z(0, 0)},
+                 {box.high.x, box.high.y, z(m, 0)},
+                 {box.low.x, box.low.y, z(0, m)},
+                 {box.high.x, box.low.y, z(m, m)}}};
+    }
+
+    // Parts of a tile are drawn apart: the lines between them must be edges.
+    void add_parts(const Bisection& b, int part_level, std::uint8_t* active) const {
+        const int stride = m >> part_level;
+        for (int j = 0; part_level > 0 && j <= m; j += stride)
+            for (int i = 0; i <= m; i += stride) add_closed(b, b.index(i, j), active);
+    }
+
+    void choose(Drawn& tile, std::span<const Camera> views, const MeshSettings& s) {
+        Chosen& c = states[static_cast<std::size_t>(tile.slot)].chosen;
+        int rung = kNoRung;
+        if (lod.method == LodMethod::block_rsg) {
+            rung = rung_of(tile, views, s.tau_px);
+            if (rung == c.rung && same_shape(c, tile, s)) return;
+        } else if (may_reuse(c, tile, views, s)) {
+            return;
+        }
+        ++counters.chosen;
+        std::uint8_t* active = chosen.data() + at(tile.slot);
+        const Bisection& b = bisection_of(tile.item->tile);
+        start_set(b, active);
+        if (lod.method == LodMethod::block_rsg) {
+            choose_block(tile, threshold_of(rung), s.half_curvature, active);
+        } else {
+            std::array<TileSight, kMaxViews> sights;
+            std::size_t count = 0;
+            for (std::size_t v = 0; v < views.size(); ++v)
+                if ((tile.seen_by >> v & 1) != 0) sights[count++] = sight_of(tile, views[v], s);
+            const std::span used(sights.data(), count);
+            if (lod.metric == ErrorMetric::uc)
+                choose_uc(tile, used, active);
+            else
+                choose_guaranteed(tile, used, active);
+        }
+        add_parts(b, tile.part_level, active);
+        c = {true,         tile.item->geomip, tile.item->edge_mask, tile.part_level, tile.seen_by, rung,
+             s.tau_px,     s.half_curvature,  {},                   {}};
+        for (std::size_t v = 0; v < std::min(views.size(), kMostEyes); ++v) {
+            c.eyes[v] = views[v].eye;
+            c.error_px[v] = views[v].focal_px() * views[v].off_axis_factor();
+        }
+    }
+
+    // --- shared edges ------------------------------------------------------------------------------------------
+
+    void link_tiles() {
+        index.reset(tiles.size());
+        for (std::size_t t = 0; t < tiles.size(); ++t) index.add(tiles[t].item->tile, static_cast<std::int32_t>(t));
+        links.clear();
+        for (std::size_t t = 0; t < tiles.size(); ++t)
+            for (int side = 0; side < 4; ++side) link(static_cast<std::int32_t>(t), side);
+        first_link.assign(tiles.size() + 1, 0);
+        for (const Link& l : links) {
+            ++first_link[static_cast<std::size_t>(l.fine) + 1];
+            ++first_link[static_cast<std::size_t>(l.coarse) + 1];
+        }
+        for (std::size_t t = 0; t < tiles.size(); ++t) first_link[t + 1] += first_link[t];
+        links_of.resize(2 * links.size());
+        queue.assign(first_link.begin(), first_link.end());
+        for (std::size_t k = 0; k < links.size(); ++k)
+            for (const std::int32_t t : {links[k].fine, links[k].coarse})
+                links_of[static_cast<std::size_t>(queue[static_cast<std::size_t>(t)]++)] = static_cast<std::int32_t>(k);
+    }
+
+    // Each pair once: from the smaller page, or towards east and south.
+    void link(std::int32_t t, int side) {
+        const DrawItem& item = *tiles[static_cast<std::size_t>(t)].item;
+        TileId other = beside(item.tile, side);
+        if (!dataset.lattice.contains(other)) return;
+        std::int32_t found = index.find(other);
+        if (found >= 0 && (side == 0 || side == 3)) return;
+        while (found < 0 && other.level > 0) {
+            other = parent_of(other);
+            found = index.find(other);
+        }
+        if (found < 0) return;
+        const DrawItem& coarse = *tiles[static_cast<std::size_t>(found)].item;
+        const Lattice& l = dataset.lattice;
+        const auto edge_stride = [&](const DrawItem& of, int its_side) {
+            return l.step(of.tile.level) << (of.geomip + static_cast<int>(of.edge_mask >> its_side & 1u));
+        };
+        const std::int64_t stride = std::max(edge_stride(item, side), edge_stride(coarse, opposite(side)));
+        const std::int64_t fine_step = l.step(item.tile.level), coarse_step = l.step(coarse.tile.level);
+        const LatticePoint a = l.corner(item.tile), c = l.corner(coarse.tile);
+        const bool along_i = side == 0 || side == 2;
+        const std::int64_t offset = along_i ? a.i - c.i : a.j - c.j;
+        Link link;
+        link.fine = t;
+        link.coarse = found;
+        const int row = along_i ? 1 : m + 1;
+        link.fine_first = side_index(side, 0, m);
+        link.fine_step = static_cast<std::int32_t>(stride / fine_step) * row;
+        link.coarse_first = side_index(opposite(side), static_cast<int>(offset / coarse_step), m);
+        link.coarse_step = static_cast<std::int32_t>(stride / coarse_step) * row;
+        link.count = static_cast<std::int32_t>(l.tile_extent(item.tile.level) / stride) + 1;
+        links.push_back(link);
+    }
+
+    void enqueue(std::int32_t t) {
+        if (queued[static_cast<std::size_t>(t)] != 0) return;
+        queued[static_cast<std::size_t>(t)] = 1;
+        queue.push_back(t);
+    }
+
+    // What one of two draws on their edge the other draws as well.
+    void exchange(const Link& l) {
+        std::uint8_t *fine = set_of(static_cast<std::size_t>(l.fine)),
+                     *coarse = set_of(static_cast<std::size_t>(l.coarse));
+        const Bisection& fine_grid = bisection_of(tiles[static_cast<std::size_t>(l.fine)].item->tile);
+        const Bisection& coarse_grid = bisection_of(tiles[static_cast<std::size_t>(l.coarse)].item->tile);
+        std::int32_t a = l.fine_first, b = l.coarse_first;
+        for (int k = 0; k < l.count; ++k, a += l.fine_step, b += l.coarse_step) {
+            if (fine[a] == coarse[b]) continue;
+            if (fine[a] == 0) {
+                add_closed(fine_grid, a, fine);
+                enqueue(l.fine);
+            } else {
+                add_closed(coarse_grid, b, coarse);
+                enqueue(l.coarse);
+            }
+        }
+    }
+
+    void agree() {
+        sets.resize(tiles.size() * vertices);
+        for (std::size_t t = 0; t < tiles.size(); ++t)
+            std::memcpy(set_of(t), chosen.data() + at(tiles[t].slot), vertices);
+        queue.clear();
+        queued.assign(tiles.size(), 0);
+        for (const Link& l : links) exchange(l);
+        for (std::size_t k = 0; k < queue.size(); ++k) {
+            const auto t = static_cast<std::size_t>(queue[k]);
+            queued[t] = 0;
+            for (std::int32_t i = first_link[t]; i < first_link[t + 1]; ++i)
+                exchange(links[static_cast<std::size_t>(links_of[static_cast<std::size_t>(i)])]);
+        }
+    }
+
+    // --- triangles ---------------------------------------------------------------------------------------------
+
+    // Indices of a tile's mesh, cell by cell of its parts in Morton order.
+    std::size_t emit(const Drawn& tile, const std::uint8_t* active) {
+        const Bisection& b = bisection_of(tile.item->tile);
+        std::uint32_t* out = buffer.data();
+        if (tile.part_level == 0) {
+            for (const BisectionTriangle& root : b.roots()) out = emit_triangles(b, active, root, 1, out);
+        } else {
+            for_each_cell(tile.part_level, [&](int x, int y) {
+                for (const BisectionTriangle& root : b.roots(n - tile.part_level, x, y))
+                    out = emit_triangles(b, active, root, 2 * tile.part_level + 1, out);
+            });
+        }
+        return static_cast<std::size_t>(out - buffer.data());
+    }
+
+    template <class Visit>
+    static void for_each_cell(int level, const Visit& visit) {
+        for (int code = 0; code < 1 << (2 * level); ++code) {
+            int x = 0, y = 0;
+            for (int bit = 0; bit < level; ++bit) {
+                x |= (code >> (2 * bit) & 1) << bit;
+                y |= (code >> (2 * bit + 1) & 1) << bit;
+            }
+            visit(x, y);
+        }
+    }
+
+    // False: they do not all fit.
+    bool make_meshes() {
+        std::size_t needed = 0;
+        for (std::size_t t = 0; t < tiles.size(); ++t) needed += is_current(t) ? 0 : count_indices(t);
+        const bool keep = std::all_of(tiles.begin(), tiles.end(), [&](const Drawn& tile) {
+            const auto t = static_cast<std::size_t>(&tile - tiles.data());
+            return !is_current(t) || pool.outlasts(states[static_cast<std::size_t>(tile.slot)].mesh, needed);
+        });
+        if (!keep || !pool.room_for(needed)) {
+            std::size_t all = 0;
+            for (std::size_t t = 0; t < tiles.size(); ++t) all += count_indices(t);
+            pool.clear();
+            for (SlotState& state : states) state.mesh = {};
+            if (!pool.room_for(all)) return false;
+        }
+        for (std::size_t t = 0; t < tiles.size(); ++t) {
+            if (is_current(t)) continue;
+            const Drawn& tile = tiles[t];
+            SlotState& state = states[static_cast<std::size_t>(tile.slot)];
+            const std::size_t count = emit(tile, set_of(t));
+            state.mesh = pool.put(std::span(buffer.data(), count));
+            state.drawn_valid = true;
+            state.drawn_parts = tile.part_level;
+            std::memcpy(drawn_sets.data() + at(tile.slot), set_of(t), vertices);
+            ++counters.remade;
+        }
+        return true;
+    }
+
+    bool is_current(std::size_t t) {
+        const Drawn& tile = tiles[t];
+        const SlotState& state = states[static_cast<std::size_t>(tile.slot)];
+        return state.drawn_valid && state.drawn_parts == tile.part_level && pool.holds(state.mesh) &&
+               std::memcmp(drawn_sets.data() + at(tile.slot), set_of(t), vertices) == 0;
+    }
+
+    // Two triangles, two more for each active vertex inside, one on the border.
+    std::size_t count_indices(std::size_t t) {
+        const std::uint8_t* active = set_of(t);
+        std::size_t inside = 0, border = 0;
+        for (std::size_t v = 0; v < vertices; ++v) inside += active[v];
+        for (int k = 1; k < m; ++k)
+            for (int side = 0; side < 4; ++side) border += active[side_index(side, k, m)];
+        return 3 * (2 + 2 * (inside - 4 - border) + border);
+    }
+
+    void hand_over(Selection& selection) {
+        for (DrawList& list : selection.draws)
+            for (DrawItem& item : list) item.mesh = states[static_cast<std::size_t>(item.height_slot)].mesh;
+        for (DrawList& list : selection.parts)
+            for (DrawItem& item : list) item.mesh = part_of(item);
+        selection.triangles = 0;
+        for (const Drawn& tile : tiles)
+            selection.triangles += tile.views * states[static_cast<std::size_t>(tile.slot)].mesh.count / 3;
+        counters.triangles = selection.triangles;
+    }
+
+    // The triangles of a part stand together; how many each cell has is counted over again.
+    MeshRange part_of(const DrawItem& item) {
+        const MeshRange& whole = states[static_cast<std::size_t>(item.height_slot)].mesh;
+        if (item.part.level == 0) return whole;
+        const auto t = static_cast<std::size_t>(tile_of_slot[static_cast<std::size_t>(item.height_slot)]);
+        const Drawn& tile = tiles[t];
+        const Bisection& b = bisection_of(item.tile);
+        std::uint32_t offset = 0, size = 0;
+        const int finer = tile.part_level - item.part.level;
+        for_each_cell(tile.part_level, [&](int x, int y) {
+            std::uint32_t* out = buffer.data();
+            for (const BisectionTriangle& root : b.roots(n - tile.part_level, x, y))
+                out = emit_triangles(b, set_of(t), root, 2 * tile.part_level + 1, out);
+            const auto count = static_cast<std::uint32_t>(out - buffer.data());
+            if (x >> finer == item.part.x && y >> finer == item.part.y)
+                size += count;
+            else if (size == 0)
+                offset += count;
+        });
+        return whole.section(offset, size);
+    }
+
+    void mesh(std::span<const Camera> views, const MeshSettings& settings, const Residency& residency,
+              Selection& selection) {
+        counters = {};
+        MeshSettings s = settings;
+        // Where the budget holds the cut coarse, finer vertices within its tiles would not be seen for what they are.
+        s.tau_px = std::max(s.tau_px, selection.tau_effective_px / kCutShare);
+        gather(views, s.half_curvature, residency, selection);
+        counters.tiles = static_cast<std::int64_t>(tiles.size());
+        link_tiles();
+        for (int step = 0;; ++step) {
+            for (Drawn& tile : tiles) choose(tile, views, s);
+            agree();
+            if (make_meshes()) break;
+            assert(step < kMostCoarsening);
+            selection.budget_limited = true;
+            s.tau_px = std::max(s.tau_px, 1.0 / 1024) * kCoarsening;
+        }
+        hand_over(selection);
+        selection.tau_effective_px = s.tau_px;
+        selection.max_bound_px = std::max(selection.max_bound_px, lod.promise_px(s.tau_px));
+        selection.mean_bound_px = std::max(selection.mean_bound_px, lod.promise_px(s.tau_px));
+    }
+};
+
+PageMesher::PageMesher(const Dataset& dataset, const LodSettings& lod, std::int64_t height_slots)
+    : impl_(std::make_unique<Impl>(dataset, lod, height_slots)) {}
+PageMesher::~PageMesher() = default;
+
+void PageMesher::put(std::int32_t slot, std::span<const SlotVertex> vertices, std::span<const VertexCost> costs) {
+    impl_->put(slot, vertices, costs);
+}
+
+void PageMesher::mesh(std::span<const Camera> views, const MeshSettings& settings, const Residency& residency,
+                      Selection& selection) {
+    impl_->mesh(views, settings, residency, selection);
+}
+
+MeshPool& PageMesher::pool() { return impl_->pool; }
+const MeshPool& PageMesher::pool() const { return impl_->pool; }
+const MeshCounters& PageMesher::counters() const { return impl_->counters; }
+
+std::int64_t PageMesher::slot_cost(const Dataset& dataset) {
+    const std::size_t vertices = slot_vertex_count(dataset.lattice.tile_cells_log2);
+    const std::size_t cells = std::size_t{1} << dataset.lattice.tile_cells_log2;
+    const std::size_t indices = 6 * cells * cells / kPoolShare;
+    // Heights and costs; three sets of vertices; the pool here and in the renderer.
+    return static_cast<std::int64_t>(vertices * (sizeof(float) + sizeof(VertexCost) + 3) +
+                                     indices * 2 * sizeof(std::uint32_t) + sizeof(SlotState) + sizeof(Drawn));
+}
+
+}  // namespace scree
