@@ -57,6 +57,7 @@ Scene::Scene(std::shared_ptr<const SqliteStore> store, const SceneOptions& optio
 Scene::~Scene() = default;
 
 Result<std::unique_ptr<Scene>> Scene::open(std::shared_ptr<const SqliteStore> store, const SceneOptions& options) {
+    if (auto ok = expect_built_in(options.lod); !ok) return ok.error();
     auto memory = plan_memory(store->dataset(), options.budget_bytes);
     if (!memory) return memory.error();
     return std::unique_ptr<Scene>(new Scene(std::move(store), options, *memory));

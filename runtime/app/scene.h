@@ -12,6 +12,7 @@
 
 #include "common/store/sqlite_store.h"
 #include "runtime/app/store_watch.h"
+#include "runtime/lod/lod_method.h"
 #include "runtime/lod/selection.h"
 #include "runtime/paging/pager.h"
 #include "runtime/view/curvature.h"
@@ -24,6 +25,7 @@ struct SceneOptions {
     double tau_px = 1;
     double texture_tau_px = 1;
     Curvature curvature = Curvature::automatic;
+    LodSettings lod;         ///< fixed from open() on
     bool morph = true;       ///< false: discrete levels
     double growth_s = 0.08;  ///< a level, in which a tile that came late grows out of what stood in for it
     double foresight_s = 1;  ///< how far ahead of the eye tiles are fetched; 0: not at all
@@ -47,6 +49,7 @@ struct SceneFrame {
 
 class Scene {
 public:
+    /// Errors: ErrorCode::usage where the budget is too small or `options.lod` is not built in.
     static Result<std::unique_ptr<Scene>> open(std::shared_ptr<const SqliteStore> store, const SceneOptions& options);
     /// `store` outlives the scene.
     static Result<std::unique_ptr<Scene>> open(const SqliteStore& store, const SceneOptions& options) {

@@ -16,8 +16,8 @@ enum class LodMethod {
 };
 enum class ErrorMetric {
     guaranteed,  ///< G2 of geomip, N*K of rsg, BSK of block-rsg: nothing drawn is further than tau from the finest data
-    uc,          ///< rsg: each vertex by its own level's correction, as if on the optical axis (Ueng & Chuang). No bound
-    deboer       ///< geomip: distance to the tile's centre, correction from level to level (de Boer). No bound
+    uc,     ///< rsg: each vertex by its own level's correction, as if on the optical axis (Ueng & Chuang). No bound
+    deboer  ///< geomip: distance to the tile's centre, correction from level to level (de Boer). No bound
 };
 enum class ReuseTest {
     off,    ///< every frame from scratch
@@ -66,5 +66,10 @@ std::string_view to_string(CrackFix cracks);
 /// The options that are not the defaults, as on the command line: "--lod rsg --cache exact --s 0.1"; geomip: "--lod
 /// geomip".
 std::string command_line_of(const LodSettings& settings);
+
+/// Whether this build can draw so.
+bool is_built_in(const LodSettings& settings);
+/// Errors: ErrorCode::usage naming the options, where it cannot.
+Result<void> expect_built_in(const LodSettings& settings);
 
 }  // namespace scree
