@@ -67,4 +67,9 @@ std::string_view to_string(CrackFix cracks);
 /// geomip".
 std::string command_line_of(const LodSettings& settings);
 
+/// Whether this build can draw so.
+bool is_built_in(const LodSettings& settings);
+/// Errors: ErrorCode::usage naming the options, where it cannot.
+Result<void> expect_built_in(const LodSettings& settings);
+
 }  // namespace scree

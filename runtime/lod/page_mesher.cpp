@@ -149,7 +149,7 @@ struct PageMesher::Impl {
             half_bases[static_cast<std::size_t>(level)] = 0.5 * m * m / std::exp2(level - 1);
     }
 
-    const Dataset& dataset;
+    const Dataset dataset;  // a copy: the store may be updated under it
     LodSettings lod;
     int n, m;
     std::size_t vertices;

@@ -37,8 +37,9 @@ std::int64_t fixed_cost(const Dataset& d, int loader_threads) {
     return kFixedBytes + std::max(loader_threads, 1) * loader_thread_bytes(d);
 }
 
-Result<MemoryPlan> plan_memory(const Dataset& d, std::int64_t budget_bytes, int loader_threads) {
-    const std::int64_t height = height_slot_cost(d), texture = texture_slot_cost(d);
+Result<MemoryPlan> plan_memory(const Dataset& d, std::int64_t budget_bytes, int loader_threads,
+                               std::int64_t more_per_height) {
+    const std::int64_t height = height_slot_cost(d) + more_per_height, texture = texture_slot_cost(d);
     const std::int64_t fixed = fixed_cost(d, loader_threads);
     const std::int64_t roots = d.lattice.root_rows * d.lattice.root_columns;
     const std::int64_t staged = height + texture + 2 * kStagedBytes;

@@ -25,6 +25,8 @@ std::int64_t fixed_cost(const Dataset& dataset, int loader_threads);
 
 /// Errors: ErrorCode::usage when the pinned roots would take more than an eighth of the budget; names the budget
 /// needed.
-Result<MemoryPlan> plan_memory(const Dataset& dataset, std::int64_t budget_bytes, int loader_threads = 2);
+/// `more_per_height`: what else is kept of each height slot.
+Result<MemoryPlan> plan_memory(const Dataset& dataset, std::int64_t budget_bytes, int loader_threads = 2,
+                               std::int64_t more_per_height = 0);
 
 }  // namespace scree

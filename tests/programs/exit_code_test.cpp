@@ -115,6 +115,10 @@ TEST_F(ExitCodes, WrongUseIsTwo) {
         {"shot", store_, "-o", other_, "--eye", "1,2,nan", "--look", "0,0,0"},
         {"shot", store_, "-o", other_, "--eye", "1,2,3", "--look", "1,2,3"},
         {"audit", store_, "--json"},
+        {"audit", store_, "--lod", "roam"},
+        {"audit", store_, "--lod", "rsg", "--metric", "deboer"},
+        {"audit", store_, "--s", "0.1"},
+        {"audit", store_, "--cache", "exact"},
     };
     for (const auto& arguments : wrong_views) expect_refused(scree_view(arguments), kUsage, {});
     EXPECT_FALSE(std::filesystem::exists(other_));

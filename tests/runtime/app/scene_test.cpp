@@ -169,6 +169,16 @@ TEST_F(SceneOfHills, WhatCatchingUpFetchedStandsAtOnceAndWhatComesLaterGrows) {
     }
 }
 
+TEST_F(SceneOfHills, AMethodThatIsNotBuiltInIsRefusedBeforeAnythingIsTaken) {
+    SceneOptions options = small_options();
+    options.lod.metric = ErrorMetric::uc;  // with geomip: nothing will ever draw so
+    options.budget_bytes = 1;
+    const auto scene = Scene::open(stored_->store(), options);
+    ASSERT_FALSE(scene.ok());
+    EXPECT_EQ(scene.error().code, ErrorCode::usage);
+    EXPECT_NE(scene.error().message.find("not built in"), std::string::npos) << scene.error().message;
+}
+
 TEST_F(SceneOfHills, CatchingUpDoesNotWaitForASlowDisk) {
     SceneOptions options = small_options();
     options.latency_ms = 1000;
