@@ -350,8 +350,7 @@ bool Scene::think_of_both(std::span<const Camera> views, double growth_s, SceneF
         settings.growth_s = 0;
         settings.half_curvature = curvature_of(coming_->dataset(), views);
         const Selection& coming = coming_selector_->select(views, settings, pager_->coming());
-        const bool as_good =
-            coming.max_bound_px <= shown_bound_px && coming.requests.size() <= shown.requests.size();
+        const bool as_good = coming.max_bound_px <= shown_bound_px && coming.requests.size() <= shown.requests.size();
         // An eye that moves fast may never see all of it.
         const bool late = !pager_->stale() && pager_->residency().now_s > *roots_since_s_ + kLongestTakeover_s;
         if (coming.complete || as_good || late) {

@@ -1,5 +1,5 @@
-// PageMeasure: the errors of a tile's vertices for the restricted square grid (docs/lod-methods.md, "The bound"). Runs on
-// loader threads.
+// PageMeasure: the errors of a tile's vertices for the restricted square grid (docs/lod-methods.md, "The bound"). Runs
+// on loader threads.
 #pragma once
 
 #include <array>

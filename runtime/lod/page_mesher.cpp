@@ -34,19 +34,27 @@ constexpr std::size_t kPoolShare = 4;
 constexpr std::int32_t side_index(int side, int k, int m) {
     const int row = m + 1;
     switch (side) {
-        case 0: return k;
-        case 1: return k * row + m;
-        case 2: return m * row + k;
-        default: return k * row;
+        case 0:
+            return k;
+        case 1:
+            return k * row + m;
+        case 2:
+            return m * row + k;
+        default:
+            return k * row;
     }
 }
 constexpr int opposite(int side) { return (side + 2) % 4; }
 TileId beside(TileId id, int side) {
     switch (side) {
-        case 0: return {id.level, id.x, id.y - 1};
-        case 1: return {id.level, id.x + 1, id.y};
-        case 2: return {id.level, id.x, id.y + 1};
-        default: return {id.level, id.x - 1, id.y};
+        case 0:
+            return {id.level, id.x, id.y - 1};
+        case 1:
+            return {id.level, id.x + 1, id.y};
+        case 2:
+            return {id.level, id.x, id.y + 1};
+        default:
+            return {id.level, id.x - 1, id.y};
     }
 }
 
@@ -66,7 +74,7 @@ struct Chosen {
 // What is kept of a height slot.
 struct SlotState {
     Chosen chosen;
-    MeshRange mesh;          ///< of `drawn`
+    MeshRange mesh;  ///< of `drawn`
     bool drawn_valid = false;
     std::int32_t drawn_parts = -1;
     TileId id;
@@ -209,8 +217,7 @@ struct PageMesher::Impl {
             }
         for (const DrawList& list : selection.parts)
             for (const DrawItem& item : list) {
-                Drawn& tile = tiles[static_cast<std::size_t>(
-                    tile_of_slot[static_cast<std::size_t>(item.height_slot)])];
+                Drawn& tile = tiles[static_cast<std::size_t>(tile_of_slot[static_cast<std::size_t>(item.height_slot)])];
                 tile.part_level = std::max(tile.part_level, item.part.level);
             }
         if (half_curvature > 0 && !views.empty())
@@ -280,7 +287,7 @@ struct PageMesher::Impl {
         return sight;
     }
 
-    Sight<double> see(const TileSight& s, std::size_t slot_at, std::int32_t v) const {
+    VertexSight<double> see(const TileSight& s, std::size_t slot_at, std::int32_t v) const {
         const auto k = static_cast<std::size_t>(v);
         const double dx = columns[k] - s.west, dy = rows[k] - s.north;
         const double h2 = (dx * dx + dy * dy) * s.spacing_m * s.spacing_m;
@@ -294,11 +301,10 @@ struct PageMesher::Impl {
     // half of it at the middle of a hypotenuse 2 l long, l^2 / 2R.
     bool guaranteed(const TileSight& s, std::size_t slot_at, std::int32_t v, int level) const {
         const VertexCost& cost = costs[slot_at + static_cast<std::size_t>(v)];
-        const double bulge =
-            half_bases[static_cast<std::size_t>(level)] * s.spacing_m * s.spacing_m * s.half_curvature;
+        const double bulge = half_bases[static_cast<std::size_t>(level)] * s.spacing_m * s.spacing_m * s.half_curvature;
         const double error_m = static_cast<double>(cost.error_m) + bulge;
         if (!(error_m > 0)) return false;
-        const Sight<double> sight = see(s, slot_at, v);
+        const VertexSight<double> sight = see(s, slot_at, v);
         double radius = static_cast<double>(cost.radius_m);
         // Curvature lowers the ball's points by other amounts than its centre.
         if (s.half_curvature > 0) radius *= 1 + (2 * std::sqrt(sight.h2) + radius) * s.half_curvature;
@@ -383,8 +389,8 @@ struct PageMesher::Impl {
                    const MeshSettings& s) const {
         const double now_px = view.focal_px() * view.off_axis_factor();
         if (now_px > error_px) return false;
-        if (lod.reuse == ReuseTest::paper) return reuse_p1(then, view.eye, corners_of(tile), tile.box, view.focal_px(),
-                                                           lod.s_px, s.tau_px);
+        if (lod.reuse == ReuseTest::paper)
+            return reuse_p1(then, view.eye, corners_of(tile), tile.box, view.focal_px(), lod.s_px, s.tau_px);
         const EyeToBox before = eye_to_box(then, tile.box), after = eye_to_box(view.eye, tile.box);
         double moved_m = glm::length(view.eye - then);
         // Relative to the eye, a point over a curved earth moves by more than the eye does.
@@ -398,9 +404,9 @@ struct PageMesher::Impl {
 
     std::array<glm::dvec3, 4> corners_of(const Drawn& tile) const {
         const auto z = [&](int i, int j) {
-            return dataset.height_offset_m + dataset.height_quantum_m *
-                                                 static_cast<double>(heights[at(tile.slot) + static_cast<std::size_t>(
-                                                                                                 j * (m + 1) + i)]);
+            return dataset.height_offset_m +
+                   dataset.height_quantum_m *
+                       static_cast<double>(heights[at(tile.slot) + static_cast<std::size_t>(j * (m + 1) + i)]);
         };
         const Box& box = tile.box;
         return {{{box.low.x, box.high.y, z(0, 0)},
@@ -443,8 +449,16 @@ struct PageMesher::Impl {
                 choose_guaranteed(tile, used, active);
         }
         add_parts(b, tile.part_level, active);
-        c = {true,         tile.item->geomip, tile.item->edge_mask, tile.part_level, tile.seen_by, rung,
-             s.tau_px,     s.half_curvature,  {},                   {}};
+        c = {true,
+             tile.item->geomip,
+             tile.item->edge_mask,
+             tile.part_level,
+             tile.seen_by,
+             rung,
+             s.tau_px,
+             s.half_curvature,
+             {},
+             {}};
         for (std::size_t v = 0; v < std::min(views.size(), kMostEyes); ++v) {
             c.eyes[v] = views[v].eye;
             c.error_px[v] = views[v].focal_px() * views[v].off_axis_factor();

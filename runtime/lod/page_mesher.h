@@ -32,9 +32,7 @@ struct MeshCounters {
     std::int64_t chosen = 0;     ///< of these, with vertices chosen in this frame
     std::int64_t remade = 0;     ///< and with triangles made anew
     std::int64_t triangles = 0;  ///< over all views
-    double reused_share() const {
-        return tiles > 0 ? 1 - static_cast<double>(chosen) / static_cast<double>(tiles) : 1;
-    }
+    double reused_share() const { return tiles > 0 ? 1 - static_cast<double>(chosen) / static_cast<double>(tiles) : 1; }
 };
 
 class PageMesher {

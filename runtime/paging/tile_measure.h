@@ -5,6 +5,7 @@
 #include <span>
 
 #include "common/dataset.h"
+#include "common/height_tile.h"
 #include "common/mesh/vertex_slot.h"
 #include "common/tile_id.h"
 

@@ -153,7 +153,7 @@ TEST(BlockSelection, SaturatedErrorsSelectParentsWithTheirChildrenAndKeepTheTole
         const auto sight = [&](std::int32_t v) {
             const double dx = kSpacing * (v % b.row()) - ex, dy = kSpacing * (v / b.row()) - ey,
                          dz = z[static_cast<std::size_t>(v)] - ez;
-            return Sight<double>{dx * dx + dy * dy, dz * dz};
+            return VertexSight<double>{dx * dx + dy * dy, dz * dz};
         };
         const auto selects = [&](std::int32_t v) {
             return guaranteed_selects(kErrorPx * static_cast<double>(error[static_cast<std::size_t>(v)]),
@@ -166,7 +166,7 @@ TEST(BlockSelection, SaturatedErrorsSelectParentsWithTheirChildrenAndKeepTheTole
         std::vector<double> shown(z.size());
         surface_heights(b, top_down.active(), z, shown);
         for (std::int32_t v = 0; v < static_cast<std::int32_t>(z.size()); ++v) {
-            const Sight<double> s = sight(v);
+            const VertexSight<double> s = sight(v);
             const double off = std::abs(shown[static_cast<std::size_t>(v)] - z[static_cast<std::size_t>(v)]);
             ASSERT_LE(kErrorPx * off * std::sqrt(s.h2), tau * s.r2() * (1 + 1e-9) + 1e-9);
         }
