@@ -70,8 +70,9 @@ struct Audit {
         result.errors.merge(errors);
         for (const SourceJudge& source : sources) {
             double excess_px = 0;
-            audit_against(d, source, audited, d.warp_error_m + d.height_quantum_error_m, result.source_errors,
-                          excess_px);
+            auto ok = audit_against(d, source, audited, d.warp_error_m + d.height_quantum_error_m, result.source_errors,
+                                    excess_px);
+            if (!ok) return ok;
             result.kept = result.kept && excess_px <= promised_px;
             result.source_excess_px = std::max(result.source_excess_px, excess_px);
         }

@@ -18,6 +18,8 @@ struct DisplayOptions {
     bool visible_window = true;
     bool wait_for_refresh = false;
     bool keep_heights = false;  ///< also a CpuArena, for --mesh
+    /// Whose meshes are drawn; null: patterns only. Its capacity is taken again in the renderer.
+    const MeshPool* meshes = nullptr;
     int samples = 0;
 };
 
@@ -35,6 +37,8 @@ public:
     /// Of tile memory, as taken by OpenGL.
     std::size_t arena_bytes() const { return arena_bytes_; }
     const CpuArena* arena() const { return arena_.get(); }
+    /// Another pool in place of the former, of no more capacity than DisplayOptions::meshes had.
+    void set_meshes(const MeshPool* meshes);
     FrameSettings& frame_settings() { return settings_; }
     Result<void> resize(int width_px, int height_px);
     /// A second picture of the same tiles, in a target of its own.
@@ -48,10 +52,14 @@ public:
 private:
     Display() = default;
     Result<void> make_renderer(const Dataset& dataset, const MemoryPlan& plan);
+    FrameTimes draw_into(RenderTarget& target, const Camera& camera, const DrawList& draws, double half_curvature);
+    void pass_meshes_on();
     std::unique_ptr<GlContext> context_;  // goes last
     std::unique_ptr<Renderer> renderer_;
     std::unique_ptr<RenderTarget> target_, inset_;
     std::unique_ptr<CpuArena> arena_;
+    const MeshPool* meshes_ = nullptr;
+    std::uint64_t meshes_passed_on_ = 0;  ///< MeshPool::written() of what the renderer has
     FrameSettings settings_;
     int samples_ = 0;
     std::size_t arena_bytes_ = 0;
