@@ -48,10 +48,14 @@ public:
 private:
     Display() = default;
     Result<void> make_renderer(const Dataset& dataset, const MemoryPlan& plan);
+    FrameTimes draw_into(RenderTarget& target, const Camera& camera, const DrawList& draws, double half_curvature);
+    void pass_meshes_on();
     std::unique_ptr<GlContext> context_;  // goes last
     std::unique_ptr<Renderer> renderer_;
     std::unique_ptr<RenderTarget> target_, inset_;
     std::unique_ptr<CpuArena> arena_;
+    const MeshPool* meshes_ = nullptr;  ///< the scene's
+    std::uint64_t meshes_passed_on_ = 0;  ///< MeshPool::written() of what the renderer has
     FrameSettings settings_;
     int samples_ = 0;
     std::size_t arena_bytes_ = 0;

@@ -97,7 +97,10 @@ Result<MemoryPlan> Scene::plan_of(const Dataset& dataset, const SceneOptions& op
 }
 
 void Scene::make_mesher() {
-    if (options_.lod.method != LodMethod::geomip)
+    if (options_.lod.method == LodMethod::geomip) return;
+    if (mesher_)
+        mesher_->renew(dataset(), memory_.height_slots);
+    else
         mesher_ = std::make_unique<PageMesher>(dataset(), options_.lod, memory_.height_slots);
 }
 

@@ -67,8 +67,10 @@ public:
     /// Updates taken up: of which what is drawn is the last.
     std::int64_t updates() const { return updates_; }
     const MemoryPlan& memory() const { return memory_; }
-    /// Meshes of the tiles drawn; null where tiles are drawn by patterns (geomip).
+    /// What thins the tiles drawn; null where they are drawn by patterns (geomip).
     const PageMesher* mesher() const { return mesher_.get(); }
+    /// The meshes that the tiles drawn are drawn with; stays where it is. Null likewise.
+    const MeshPool* meshes() const { return mesher_ ? &mesher_->pool() : nullptr; }
     /// Greatest of memory().resident_bytes so far.
     std::int64_t peak_resident_bytes() const { return peak_resident_bytes_; }
     /// Of all the flight, whatever was taken up.

@@ -131,7 +131,7 @@ struct TileSight {
 }  // namespace
 
 struct PageMesher::Impl {
-    Impl(const Dataset& d, const LodSettings& settings, std::int64_t height_slots)
+    Impl(const Dataset& d, const LodSettings& settings, std::int64_t height_slots, MeshPool& meshes)
         : dataset(d),
           lod(settings),
           n(d.lattice.tile_cells_log2),
@@ -143,7 +143,7 @@ struct PageMesher::Impl {
           costs(states.size() * vertices),
           chosen(states.size() * vertices),
           drawn_sets(states.size() * vertices),
-          pool(states.size() * most_indices(bisections[0]) / kPoolShare, most_indices(bisections[0])),
+          pool(meshes),
           buffer(most_indices(bisections[0])) {
         columns.resize(vertices);
         rows.resize(vertices);
@@ -168,7 +168,7 @@ struct PageMesher::Impl {
     std::vector<VertexCost> costs;
     std::vector<std::uint8_t> chosen;      ///< selected for the tile's own sake
     std::vector<std::uint8_t> drawn_sets;  ///< and with what neighbours add
-    MeshPool pool;
+    MeshPool& pool;
     std::vector<std::uint32_t> buffer;
     std::vector<double> columns, rows, half_bases;
     MeshCounters counters;
@@ -692,8 +692,23 @@ struct PageMesher::Impl {
     }
 };
 
+namespace {
+
+MeshPool pool_of(const Dataset& dataset, std::int64_t height_slots) {
+    const std::size_t cells = std::size_t{1} << dataset.lattice.tile_cells_log2, most = 6 * cells * cells;
+    return MeshPool(std::max(static_cast<std::size_t>(height_slots) * most / kPoolShare, most), most);
+}
+
+}  // namespace
+
 PageMesher::PageMesher(const Dataset& dataset, const LodSettings& lod, std::int64_t height_slots)
-    : impl_(std::make_unique<Impl>(dataset, lod, height_slots)) {}
+    : pool_(pool_of(dataset, height_slots)), impl_(std::make_unique<Impl>(dataset, lod, height_slots, pool_)) {}
+
+void PageMesher::renew(const Dataset& dataset, std::int64_t height_slots) {
+    pool_ = pool_of(dataset, height_slots);
+    impl_ = std::make_unique<Impl>(dataset, impl_->lod, height_slots, pool_);
+}
+
 PageMesher::~PageMesher() = default;
 
 void PageMesher::put(std::int32_t slot, std::span<const SlotVertex> vertices, std::span<const VertexCost> costs) {
@@ -705,8 +720,6 @@ void PageMesher::mesh(std::span<const Camera> views, const MeshSettings& setting
     impl_->mesh(views, settings, residency, selection);
 }
 
-MeshPool& PageMesher::pool() { return impl_->pool; }
-const MeshPool& PageMesher::pool() const { return impl_->pool; }
 const MeshCounters& PageMesher::counters() const { return impl_->counters; }
 
 std::int64_t PageMesher::slot_cost(const Dataset& dataset) {

@@ -40,6 +40,8 @@ public:
     /// `lod.method` rsg or block_rsg. Takes all its memory at once.
     PageMesher(const Dataset& dataset, const LodSettings& lod, std::int64_t height_slots);
     ~PageMesher();
+    /// For another state of the store, or another number of slots: all is forgotten; pool() stays where it is.
+    void renew(const Dataset& dataset, std::int64_t height_slots);
 
     /// A tile has come into a slot; what was known of the slot is forgotten.
     void put(std::int32_t slot, std::span<const SlotVertex> vertices, std::span<const VertexCost> costs);
@@ -50,8 +52,7 @@ public:
               Selection& selection);
 
     /// What the meshes' ranges lie in.
-    MeshPool& pool();
-    const MeshPool& pool() const;
+    const MeshPool& pool() const { return pool_; }
     const MeshCounters& counters() const;  ///< of the last mesh()
 
     /// Bytes for each height slot, the pool's included.
@@ -59,6 +60,7 @@ public:
 
 private:
     struct Impl;
+    MeshPool pool_;
     std::unique_ptr<Impl> impl_;
 };
 

@@ -102,8 +102,9 @@ public:
         const auto judge = SourceJudge::make(terrain.dataset(), *reader_, source.get());
         EXPECT_TRUE(judge.ok());
         judged.not_drawn = judge->not_drawn();
-        audit_against(terrain.dataset(), *judge, {camera, draws, arena_, half_curvature}, stated_m, judged.errors,
-                      judged.excess_px);
+        EXPECT_TRUE(audit_against(terrain.dataset(), *judge, {camera, draws, arena_, half_curvature}, stated_m,
+                                  judged.errors, judged.excess_px)
+                        .ok());
         return judged;
     }
     /// Every deepest tile that is stored.
