@@ -1,6 +1,7 @@
 #include "runtime/lod/page_mesher.h"
 
 #include <algorithm>
+#include <bit>
 #include <cassert>
 #include <cmath>
 #include <cstring>
@@ -18,17 +19,20 @@ namespace {
 
 /// Floor c of the metric max(h, c r) / r^2: reuse straight above a tile for a few triangles more (Scree lod, T3).
 constexpr double kMetricFloor = 0.3;
-/// Rungs of block thresholds an octave: 4 costs 9 % of triangles on average; fewer cost more, more are left sooner.
-constexpr double kRungsPerOctave = 4;
+/// Rungs of block thresholds an octave: 8 cost 4 % of triangles on average; fewer cost more, more are left sooner.
+constexpr double kRungsPerOctave = 8;
 constexpr int kNoRung = std::numeric_limits<int>::min();
 constexpr int kLeastRung = kNoRung + 1;  ///< threshold 0: whatever has an error at all
 /// Where meshes do not fit into the pool the tolerance grows by eighths of an octave.
 constexpr double kCoarsening = 1.0905077326652577;
 constexpr int kMostCoarsening = 400;
+/// Of a vertex's byte; 0: not asked about.
+constexpr std::uint8_t kActive = 1, kRejected = 2;
 /// Eyes kept of a tile's last choice; with more views nothing is reused.
 constexpr std::size_t kMostEyes = 4;
-/// Indices a height slot in the pool, of the 3 * 2 * m^2 of a tile with nothing dropped.
-constexpr std::size_t kPoolShare = 4;
+/// A height slot's share in the pool, of the 3 * 2 * m^2 indices of a tile with nothing dropped: what an eighth of them
+/// comes to where half of the slots are drawn.
+constexpr std::size_t kPoolShare = 16;
 
 // Sides by Direction: the place of the k-th sample along a side, and the neighbour's opposite side.
 constexpr std::int32_t side_index(int side, int k, int m) {
@@ -58,6 +62,34 @@ TileId beside(TileId id, int side) {
     }
 }
 
+// What is known of a vertex, in 8 bytes: its height, and its cost rounded up to 8 significant bits.
+struct VertexRecord {
+    float height_n = 0;
+    std::uint16_t error = 0, radius = 0;
+};
+
+std::uint16_t rounded_up(float value) {
+    const auto bits = std::bit_cast<std::uint32_t>(value);
+    return static_cast<std::uint16_t>((bits + 0xFFFFu) >> 16);
+}
+double value_of(std::uint16_t upper) {
+    return static_cast<double>(std::bit_cast<float>(static_cast<std::uint32_t>(upper) << 16));
+}
+
+/// Which vertices of a tile's four sides are active, by Direction; bit k: the k-th sample.
+struct Border {
+    static constexpr std::size_t kWords = ((std::size_t{1} << kMaxTileCellsLog2) + 64) / 64;
+    std::array<std::array<std::uint64_t, kWords>, 4> sides{};
+
+    bool has(int side, int k) const {
+        return (sides[static_cast<std::size_t>(side)][static_cast<std::size_t>(k) / 64] >> (k % 64) & 1) != 0;
+    }
+    void set(int side, int k) {
+        sides[static_cast<std::size_t>(side)][static_cast<std::size_t>(k) / 64] |= std::uint64_t{1} << (k % 64);
+    }
+    friend bool operator==(const Border&, const Border&) = default;
+};
+
 // Where the vertices of a mesh were chosen for.
 struct Chosen {
     bool valid = false;
@@ -74,10 +106,11 @@ struct Chosen {
 // What is kept of a height slot.
 struct SlotState {
     Chosen chosen;
-    MeshRange mesh;  ///< of `drawn`
-    bool drawn_valid = false;
-    std::int32_t drawn_parts = -1;
-    TileId id;
+    Border own;         ///< of what was chosen
+    Border drawn;       ///< with what neighbours added, of `mesh`
+    bool made = false;  ///< `mesh` is of what was chosen last and of `drawn`
+    MeshRange mesh;
+    std::vector<std::uint32_t> cell_starts;  ///< of its parts' cells in the mesh, Morton order, and the end
 };
 
 // A tile drawn in this frame.
@@ -89,11 +122,15 @@ struct Drawn {
     double base_error_m = 0;
     Box box;
     std::int64_t views = 0;
+    Border border;  ///< own, and what neighbours add
 };
 
+// Two tiles that share an edge or a part of one: `fine` is the smaller page or one as large.
 struct Link {
-    std::int32_t fine = 0, coarse = 0;  ///< tiles; `fine` is the smaller page or one as large
-    std::int32_t fine_first = 0, fine_step = 0, coarse_first = 0, coarse_step = 0, count = 0;  ///< shared vertices
+    std::int32_t fine = 0, coarse = 0;
+    std::int32_t side = 0;  ///< of `fine`
+    bool same_size = true;
+    std::int32_t fine_step = 0, coarse_first = 0, coarse_step = 0, count = 0;  ///< shared vertices; else unused
 };
 
 // Tiles of a frame by name: open addressing, kept from frame to frame.
@@ -139,10 +176,10 @@ struct PageMesher::Impl {
           vertices(slot_vertex_count(n)),
           bisections{Bisection(n, false), Bisection(n, true)},
           states(static_cast<std::size_t>(height_slots)),
-          heights(states.size() * vertices),
-          costs(states.size() * vertices),
+          records(states.size() * vertices),
           chosen(states.size() * vertices),
-          drawn_sets(states.size() * vertices),
+          added(4 * static_cast<std::size_t>(m + 1)),
+          set(vertices),
           pool(meshes),
           buffer(most_indices(bisections[0])) {
         columns.resize(vertices);
@@ -155,6 +192,14 @@ struct PageMesher::Impl {
         // Half a hypotenuse of level k, squared, in samples: m^2 / 2 for the tile, half of that a level.
         for (int level = 1; level <= 2 * n; ++level)
             half_bases[static_cast<std::size_t>(level)] = 0.5 * m * m / std::exp2(level - 1);
+        words = (static_cast<std::size_t>(m) + 64) / 64;
+        // What a border vertex depends on is the same in even and odd tiles: the tile's own centre has only corners.
+        for (int side = 0; side < 4; ++side)
+            for (int k = 0; k <= m; ++k) {
+                std::fill(set.begin(), set.end(), std::uint8_t{0});
+                add_closed(bisections[0], side_index(side, k, m), set.data());
+                added[static_cast<std::size_t>(side * (m + 1) + k)] = border_of(set.data());
+            }
     }
 
     const Dataset dataset;  // a copy: the store may be updated under it
@@ -164,10 +209,12 @@ struct PageMesher::Impl {
     std::array<Bisection, 2> bisections;
     std::vector<SlotState> states;
     // By slot, an entry a vertex.
-    std::vector<float> heights;  ///< quanta
-    std::vector<VertexCost> costs;
-    std::vector<std::uint8_t> chosen;      ///< selected for the tile's own sake
-    std::vector<std::uint8_t> drawn_sets;  ///< and with what neighbours add
+    std::vector<VertexRecord> records;
+    std::vector<std::uint8_t> chosen;  ///< 1: selected for the tile's own sake
+    /// By side and place: the border vertices that come with a border vertex, itself among them.
+    std::vector<Border> added;
+    std::size_t words = 1;          ///< of a side's bits
+    std::vector<std::uint8_t> set;  ///< a buffer: of one tile
     MeshPool& pool;
     std::vector<std::uint32_t> buffer;
     std::vector<double> columns, rows, half_bases;
@@ -178,18 +225,26 @@ struct PageMesher::Impl {
     TileIndex index;
     std::vector<Link> links;
     std::vector<std::int32_t> first_link, links_of;
-    std::vector<std::uint8_t> sets;  ///< by tile: what is drawn
     std::vector<std::int32_t> queue;
     std::vector<std::uint8_t> queued;
+    std::vector<const Drawn*> stale;
 
     const Bisection& bisection_of(TileId id) const { return bisections[static_cast<std::size_t>((id.x + id.y) & 1)]; }
     std::size_t at(std::int32_t slot) const { return static_cast<std::size_t>(slot) * vertices; }
-    std::uint8_t* set_of(std::size_t tile) { return sets.data() + tile * vertices; }
+
+    Border border_of(const std::uint8_t* active) const {
+        Border border;
+        for (int side = 0; side < 4; ++side)
+            for (int k = 0; k <= m; ++k)
+                if (active[side_index(side, k, m)] == kActive) border.set(side, k);
+        return border;
+    }
 
     void put(std::int32_t slot, std::span<const SlotVertex> from, std::span<const VertexCost> cost) {
         assert(from.size() == vertices && cost.size() == vertices);
-        for (std::size_t k = 0; k < vertices; ++k) heights[at(slot) + k] = from[k].height_n;
-        std::copy(cost.begin(), cost.end(), costs.begin() + static_cast<std::ptrdiff_t>(at(slot)));
+        VertexRecord* to = records.data() + at(slot);
+        for (std::size_t k = 0; k < vertices; ++k)
+            to[k] = {from[k].height_n, rounded_up(cost[k].error_m), rounded_up(cost[k].radius_m)};
         states[static_cast<std::size_t>(slot)] = {};
     }
 
@@ -255,11 +310,15 @@ struct PageMesher::Impl {
     template <class Selects>
     void refine(const Bisection& b, const DrawItem& item, const BisectionTriangle& t, int level, std::uint8_t* active,
                 const Selects& selects) {
-        const std::int32_t v = t.middle();
         if (level > 2 * (n - item.geomip)) return;
+        const std::int32_t v = t.middle();
+        if (active[v] == kRejected) return;
         if (active[v] == 0) {
-            if (!may_have(item, v, level) || !selects(v, level)) return;
-            active[v] = 1;
+            if (!may_have(item, v, level) || !selects(v, level)) {
+                active[v] = kRejected;
+                return;
+            }
+            active[v] = kActive;
         }
         refine(b, item, t.left_half(), level + 1, active, selects);
         refine(b, item, t.right_half(), level + 1, active, selects);
@@ -292,7 +351,8 @@ struct PageMesher::Impl {
         const double dx = columns[k] - s.west, dy = rows[k] - s.north;
         const double h2 = (dx * dx + dy * dy) * s.spacing_m * s.spacing_m;
         const double z = dataset.height_offset_m +
-                         static_cast<double>(heights[slot_at + k]) * dataset.height_quantum_m - h2 * s.half_curvature;
+                         static_cast<double>(records[slot_at + k].height_n) * dataset.height_quantum_m -
+                         h2 * s.half_curvature;
         const double dz = z - s.eye_z;
         return {h2, dz * dz};
     }
@@ -300,12 +360,12 @@ struct PageMesher::Impl {
     // N*K with what the tile itself is off by, and with what flat triangles miss of the earth's curvature: no more than
     // half of it at the middle of a hypotenuse 2 l long, l^2 / 2R.
     bool guaranteed(const TileSight& s, std::size_t slot_at, std::int32_t v, int level) const {
-        const VertexCost& cost = costs[slot_at + static_cast<std::size_t>(v)];
+        const VertexRecord& record = records[slot_at + static_cast<std::size_t>(v)];
         const double bulge = half_bases[static_cast<std::size_t>(level)] * s.spacing_m * s.spacing_m * s.half_curvature;
-        const double error_m = static_cast<double>(cost.error_m) + bulge;
+        const double error_m = value_of(record.error) + bulge;
         if (!(error_m > 0)) return false;
         const VertexSight<double> sight = see(s, slot_at, v);
-        double radius = static_cast<double>(cost.radius_m);
+        double radius = value_of(record.radius);
         // Curvature lowers the ball's points by other amounts than its centre.
         if (s.half_curvature > 0) radius *= 1 + (2 * std::sqrt(sight.h2) + radius) * s.half_curvature;
         return guaranteed_selects(s.error_px * (error_m + s.base_m), radius, kMetricFloor, s.tau_px, sight);
@@ -330,7 +390,7 @@ struct PageMesher::Impl {
             const std::int32_t v = order[k];
             const BisectionVertex& vertex = b.vertex(v);
             if (!may_have(*tile.item, v, vertex.level)) continue;
-            const double delta = static_cast<double>(costs[slot_at + static_cast<std::size_t>(v)].error_m);
+            const double delta = value_of(records[slot_at + static_cast<std::size_t>(v)].error);
             const bool want = active[v] != 0 || std::any_of(sights.begin(), sights.end(), [&](const TileSight& s) {
                                   return uc_selects(s.error_px * delta, s.tau_px, see(s, slot_at, v));
                               });
@@ -349,7 +409,7 @@ struct PageMesher::Impl {
         const double bulge = spacing_m * spacing_m * half_curvature;
         for (const BisectionTriangle& root : b.roots())
             refine(b, *tile.item, root, 1, active, [&](std::int32_t v, int level) {
-                return static_cast<double>(costs[slot_at + static_cast<std::size_t>(v)].error_m) +
+                return value_of(records[slot_at + static_cast<std::size_t>(v)].error) +
                            bulge * half_bases[static_cast<std::size_t>(level)] >
                        threshold_m;
             });
@@ -406,7 +466,7 @@ struct PageMesher::Impl {
         const auto z = [&](int i, int j) {
             return dataset.height_offset_m +
                    dataset.height_quantum_m *
-                       static_cast<double>(heights[at(tile.slot) + static_cast<std::size_t>(j * (m + 1) + i)]);
+                       static_cast<double>(records[at(tile.slot) + static_cast<std::size_t>(j * (m + 1) + i)].height_n);
         };
         const Box& box = tile.box;
         return {{{box.low.x, box.high.y, z(0, 0)},
@@ -448,7 +508,11 @@ struct PageMesher::Impl {
             else
                 choose_guaranteed(tile, used, active);
         }
+        for (std::size_t v = 0; v < vertices; ++v) active[v] &= kActive;
         add_parts(b, tile.part_level, active);
+        SlotState& state = states[static_cast<std::size_t>(tile.slot)];
+        state.own = border_of(active);
+        state.made = false;
         c = {true,
              tile.item->geomip,
              tile.item->edge_mask,
@@ -511,11 +575,11 @@ struct PageMesher::Impl {
         Link link;
         link.fine = t;
         link.coarse = found;
-        const int row = along_i ? 1 : m + 1;
-        link.fine_first = side_index(side, 0, m);
-        link.fine_step = static_cast<std::int32_t>(stride / fine_step) * row;
-        link.coarse_first = side_index(opposite(side), static_cast<int>(offset / coarse_step), m);
-        link.coarse_step = static_cast<std::int32_t>(stride / coarse_step) * row;
+        link.side = side;
+        link.same_size = other.level == item.tile.level;
+        link.fine_step = static_cast<std::int32_t>(stride / fine_step);
+        link.coarse_first = static_cast<std::int32_t>(offset / coarse_step);
+        link.coarse_step = static_cast<std::int32_t>(stride / coarse_step);
         link.count = static_cast<std::int32_t>(l.tile_extent(item.tile.level) / stride) + 1;
         links.push_back(link);
     }
@@ -526,29 +590,46 @@ struct PageMesher::Impl {
         queue.push_back(t);
     }
 
+    // A vertex comes with what it depends on, which may lie on the tile's other sides.
+    void add(std::int32_t t, int side, int k) {
+        const Border& more = added[static_cast<std::size_t>(side * (m + 1) + k)];
+        Border& border = tiles[static_cast<std::size_t>(t)].border;
+        for (std::size_t i = 0; i < 4; ++i)
+            for (std::size_t w = 0; w < words; ++w) border.sides[i][w] |= more.sides[i][w];
+        enqueue(t);
+    }
+
     // What one of two draws on their edge the other draws as well.
     void exchange(const Link& l) {
-        std::uint8_t *fine = set_of(static_cast<std::size_t>(l.fine)),
-                     *coarse = set_of(static_cast<std::size_t>(l.coarse));
-        const Bisection& fine_grid = bisection_of(tiles[static_cast<std::size_t>(l.fine)].item->tile);
-        const Bisection& coarse_grid = bisection_of(tiles[static_cast<std::size_t>(l.coarse)].item->tile);
-        std::int32_t a = l.fine_first, b = l.coarse_first;
-        for (int k = 0; k < l.count; ++k, a += l.fine_step, b += l.coarse_step) {
-            if (fine[a] == coarse[b]) continue;
-            if (fine[a] == 0) {
-                add_closed(fine_grid, a, fine);
-                enqueue(l.fine);
-            } else {
-                add_closed(coarse_grid, b, coarse);
-                enqueue(l.coarse);
+        Border &fine = tiles[static_cast<std::size_t>(l.fine)].border,
+               &coarse = tiles[static_cast<std::size_t>(l.coarse)].border;
+        const int other = opposite(l.side);
+        if (!l.same_size) {
+            for (int k = 0; k < l.count; ++k) {
+                const int a = k * l.fine_step, b = l.coarse_first + k * l.coarse_step;
+                if (fine.has(l.side, a) == coarse.has(other, b)) continue;
+                if (fine.has(l.side, a))
+                    add(l.coarse, other, b);
+                else
+                    add(l.fine, l.side, a);
+            }
+            return;
+        }
+        for (std::size_t w = 0; w < words; ++w) {
+            std::uint64_t apart =
+                fine.sides[static_cast<std::size_t>(l.side)][w] ^ coarse.sides[static_cast<std::size_t>(other)][w];
+            for (; apart != 0; apart &= apart - 1) {
+                const int k = static_cast<int>(64 * w) + std::countr_zero(apart);
+                if (fine.has(l.side, k))
+                    add(l.coarse, other, k);
+                else
+                    add(l.fine, l.side, k);
             }
         }
     }
 
     void agree() {
-        sets.resize(tiles.size() * vertices);
-        for (std::size_t t = 0; t < tiles.size(); ++t)
-            std::memcpy(set_of(t), chosen.data() + at(tiles[t].slot), vertices);
+        for (Drawn& tile : tiles) tile.border = states[static_cast<std::size_t>(tile.slot)].own;
         queue.clear();
         queued.assign(tiles.size(), 0);
         for (const Link& l : links) exchange(l);
@@ -562,19 +643,44 @@ struct PageMesher::Impl {
 
     // --- triangles ---------------------------------------------------------------------------------------------
 
-    // Indices of a tile's mesh, cell by cell of its parts in Morton order.
-    std::size_t emit(const Drawn& tile, const std::uint8_t* active) {
+    // The tile's own vertices with those of its border, into `set`; returns the indices that they make.
+    std::size_t assemble(const Drawn& tile) {
+        std::memcpy(set.data(), chosen.data() + at(tile.slot), vertices);
         const Bisection& b = bisection_of(tile.item->tile);
+        const Border& own = states[static_cast<std::size_t>(tile.slot)].own;
+        for (std::size_t side = 0; side < 4; ++side)
+            for (std::size_t w = 0; w < words; ++w)
+                for (std::uint64_t more = tile.border.sides[side][w] & ~own.sides[side][w]; more != 0;
+                     more &= more - 1) {
+                    const int k = static_cast<int>(64 * w) + std::countr_zero(more);
+                    add_closed(b, side_index(static_cast<int>(side), k, m), set.data());
+                }
+        // Two triangles, two more for each active vertex inside, one on the border.
+        std::size_t active = 0, border = 0;
+        for (std::size_t v = 0; v < vertices; ++v) active += set[v];
+        for (const auto& side : tile.border.sides)
+            for (std::size_t w = 0; w < words; ++w) border += static_cast<std::size_t>(std::popcount(side[w]));
+        border -= 8;  // the corners, of two sides each
+        return 3 * (2 + 2 * (active - 4 - border) + border);
+    }
+
+    // Writes what was assembled, cell by cell of its parts in Morton order.
+    void emit(const Drawn& tile, std::size_t count) {
+        const Bisection& b = bisection_of(tile.item->tile);
+        SlotState& state = states[static_cast<std::size_t>(tile.slot)];
         std::uint32_t* out = buffer.data();
-        if (tile.part_level == 0) {
-            for (const BisectionTriangle& root : b.roots()) out = emit_triangles(b, active, root, 1, out);
-        } else {
-            for_each_cell(tile.part_level, [&](int x, int y) {
-                for (const BisectionTriangle& root : b.roots(n - tile.part_level, x, y))
-                    out = emit_triangles(b, active, root, 2 * tile.part_level + 1, out);
-            });
-        }
-        return static_cast<std::size_t>(out - buffer.data());
+        state.cell_starts.clear();
+        for_each_cell(tile.part_level, [&](int x, int y) {
+            if (tile.part_level > 0) state.cell_starts.push_back(static_cast<std::uint32_t>(out - buffer.data()));
+            for (const BisectionTriangle& root : b.roots(n - tile.part_level, x, y))
+                out = emit_triangles(b, set.data(), root, 2 * tile.part_level + 1, out);
+        });
+        if (tile.part_level > 0) state.cell_starts.push_back(static_cast<std::uint32_t>(count));
+        assert(static_cast<std::size_t>(out - buffer.data()) == count);
+        state.mesh = pool.put(std::span(buffer.data(), count));
+        state.drawn = tile.border;
+        state.made = true;
+        ++counters.remade;
     }
 
     template <class Visit>
@@ -592,47 +698,33 @@ struct PageMesher::Impl {
     // False: they do not all fit.
     bool make_meshes() {
         std::size_t needed = 0;
-        for (std::size_t t = 0; t < tiles.size(); ++t) needed += is_current(t) ? 0 : count_indices(t);
+        stale.clear();
+        for (const Drawn& tile : tiles)
+            if (!is_made(tile)) {
+                stale.push_back(&tile);
+                needed += assemble(tile);
+            }
         const bool keep = std::all_of(tiles.begin(), tiles.end(), [&](const Drawn& tile) {
-            const auto t = static_cast<std::size_t>(&tile - tiles.data());
-            return !is_current(t) || pool.outlasts(states[static_cast<std::size_t>(tile.slot)].mesh, needed);
+            return !is_made(tile) || pool.outlasts(states[static_cast<std::size_t>(tile.slot)].mesh, needed);
         });
         if (!keep || !pool.room_for(needed)) {
-            std::size_t all = 0;
-            for (std::size_t t = 0; t < tiles.size(); ++t) all += count_indices(t);
             pool.clear();
-            for (SlotState& state : states) state.mesh = {};
-            if (!pool.room_for(all)) return false;
+            needed = 0;
+            stale.clear();
+            for (const Drawn& tile : tiles) {
+                stale.push_back(&tile);
+                needed += assemble(tile);
+            }
+            for (SlotState& state : states) state.made = false;
+            if (!pool.room_for(needed)) return false;
         }
-        for (std::size_t t = 0; t < tiles.size(); ++t) {
-            if (is_current(t)) continue;
-            const Drawn& tile = tiles[t];
-            SlotState& state = states[static_cast<std::size_t>(tile.slot)];
-            const std::size_t count = emit(tile, set_of(t));
-            state.mesh = pool.put(std::span(buffer.data(), count));
-            state.drawn_valid = true;
-            state.drawn_parts = tile.part_level;
-            std::memcpy(drawn_sets.data() + at(tile.slot), set_of(t), vertices);
-            ++counters.remade;
-        }
+        for (const Drawn* tile : stale) emit(*tile, assemble(*tile));
         return true;
     }
 
-    bool is_current(std::size_t t) {
-        const Drawn& tile = tiles[t];
+    bool is_made(const Drawn& tile) const {
         const SlotState& state = states[static_cast<std::size_t>(tile.slot)];
-        return state.drawn_valid && state.drawn_parts == tile.part_level && pool.holds(state.mesh) &&
-               std::memcmp(drawn_sets.data() + at(tile.slot), set_of(t), vertices) == 0;
-    }
-
-    // Two triangles, two more for each active vertex inside, one on the border.
-    std::size_t count_indices(std::size_t t) {
-        const std::uint8_t* active = set_of(t);
-        std::size_t inside = 0, border = 0;
-        for (std::size_t v = 0; v < vertices; ++v) inside += active[v];
-        for (int k = 1; k < m; ++k)
-            for (int side = 0; side < 4; ++side) border += active[side_index(side, k, m)];
-        return 3 * (2 + 2 * (inside - 4 - border) + border);
+        return state.made && state.drawn == tile.border && pool.holds(state.mesh);
     }
 
     void hand_over(Selection& selection) {
@@ -646,26 +738,18 @@ struct PageMesher::Impl {
         counters.triangles = selection.triangles;
     }
 
-    // The triangles of a part stand together; how many each cell has is counted over again.
-    MeshRange part_of(const DrawItem& item) {
-        const MeshRange& whole = states[static_cast<std::size_t>(item.height_slot)].mesh;
-        if (item.part.level == 0) return whole;
-        const auto t = static_cast<std::size_t>(tile_of_slot[static_cast<std::size_t>(item.height_slot)]);
-        const Drawn& tile = tiles[t];
-        const Bisection& b = bisection_of(item.tile);
-        std::uint32_t offset = 0, size = 0;
-        const int finer = tile.part_level - item.part.level;
-        for_each_cell(tile.part_level, [&](int x, int y) {
-            std::uint32_t* out = buffer.data();
-            for (const BisectionTriangle& root : b.roots(n - tile.part_level, x, y))
-                out = emit_triangles(b, set_of(t), root, 2 * tile.part_level + 1, out);
-            const auto count = static_cast<std::uint32_t>(out - buffer.data());
-            if (x >> finer == item.part.x && y >> finer == item.part.y)
-                size += count;
-            else if (size == 0)
-                offset += count;
-        });
-        return whole.section(offset, size);
+    // The cells of a part stand together.
+    MeshRange part_of(const DrawItem& item) const {
+        const SlotState& state = states[static_cast<std::size_t>(item.height_slot)];
+        if (state.cell_starts.empty()) return state.mesh;
+        const int finer = std::countr_zero(state.cell_starts.size() - 1) / 2 - item.part.level;
+        std::size_t first = 0;
+        for (int bit = item.part.level; bit-- > 0;)
+            first = first << 2 | static_cast<std::size_t>(item.part.y >> bit & 1) << 1 |
+                    static_cast<std::size_t>(item.part.x >> bit & 1);
+        const std::size_t end = (first + 1) << (2 * finer);
+        first <<= 2 * finer;
+        return state.mesh.section(state.cell_starts[first], state.cell_starts[end] - state.cell_starts[first]);
     }
 
     void mesh(std::span<const Camera> views, const MeshSettings& settings, const Residency& residency,
@@ -726,9 +810,9 @@ std::int64_t PageMesher::slot_cost(const Dataset& dataset) {
     const std::size_t vertices = slot_vertex_count(dataset.lattice.tile_cells_log2);
     const std::size_t cells = std::size_t{1} << dataset.lattice.tile_cells_log2;
     const std::size_t indices = 6 * cells * cells / kPoolShare;
-    // Heights and costs; three sets of vertices; the pool here and in the renderer.
-    return static_cast<std::int64_t>(vertices * (sizeof(float) + sizeof(VertexCost) + 3) +
-                                     indices * 2 * sizeof(std::uint32_t) + sizeof(SlotState) + sizeof(Drawn));
+    // The pool stands here and in the renderer.
+    return static_cast<std::int64_t>(vertices * (sizeof(VertexRecord) + 1) + indices * 2 * sizeof(std::uint32_t) +
+                                     sizeof(SlotState) + sizeof(Drawn));
 }
 
 }  // namespace scree
