@@ -227,7 +227,6 @@ struct PageMesher::Impl {
     std::vector<std::int32_t> first_link, links_of;
     std::vector<std::int32_t> queue;
     std::vector<std::uint8_t> queued;
-    std::vector<const Drawn*> stale;
 
     const Bisection& bisection_of(TileId id) const { return bisections[static_cast<std::size_t>((id.x + id.y) & 1)]; }
     std::size_t at(std::int32_t slot) const { return static_cast<std::size_t>(slot) * vertices; }
@@ -643,8 +642,8 @@ struct PageMesher::Impl {
 
     // --- triangles ---------------------------------------------------------------------------------------------
 
-    // The tile's own vertices with those of its border, into `set`; returns the indices that they make.
-    std::size_t assemble(const Drawn& tile) {
+    // The tile's own vertices with those of its border, into `set`.
+    void assemble(const Drawn& tile) {
         std::memcpy(set.data(), chosen.data() + at(tile.slot), vertices);
         const Bisection& b = bisection_of(tile.item->tile);
         const Border& own = states[static_cast<std::size_t>(tile.slot)].own;
@@ -655,17 +654,11 @@ struct PageMesher::Impl {
                     const int k = static_cast<int>(64 * w) + std::countr_zero(more);
                     add_closed(b, side_index(static_cast<int>(side), k, m), set.data());
                 }
-        // Two triangles, two more for each active vertex inside, one on the border.
-        std::size_t active = 0, border = 0;
-        for (std::size_t v = 0; v < vertices; ++v) active += set[v];
-        for (const auto& side : tile.border.sides)
-            for (std::size_t w = 0; w < words; ++w) border += static_cast<std::size_t>(std::popcount(side[w]));
-        border -= 8;  // the corners, of two sides each
-        return 3 * (2 + 2 * (active - 4 - border) + border);
     }
 
-    // Writes what was assembled, cell by cell of its parts in Morton order.
-    void emit(const Drawn& tile, std::size_t count) {
+    // Cell by cell of its parts, in Morton order.
+    void emit(const Drawn& tile) {
+        assemble(tile);
         const Bisection& b = bisection_of(tile.item->tile);
         SlotState& state = states[static_cast<std::size_t>(tile.slot)];
         std::uint32_t* out = buffer.data();
@@ -675,8 +668,8 @@ struct PageMesher::Impl {
             for (const BisectionTriangle& root : b.roots(n - tile.part_level, x, y))
                 out = emit_triangles(b, set.data(), root, 2 * tile.part_level + 1, out);
         });
+        const auto count = static_cast<std::size_t>(out - buffer.data());
         if (tile.part_level > 0) state.cell_starts.push_back(static_cast<std::uint32_t>(count));
-        assert(static_cast<std::size_t>(out - buffer.data()) == count);
         state.mesh = pool.put(std::span(buffer.data(), count));
         state.drawn = tile.border;
         state.made = true;
@@ -697,29 +690,16 @@ struct PageMesher::Impl {
 
     // False: they do not all fit.
     bool make_meshes() {
-        std::size_t needed = 0;
-        stale.clear();
+        if (make_missing()) return true;
+        // New ones have overwritten some that are still needed.
+        pool.clear();
+        return make_missing();
+    }
+
+    bool make_missing() {
         for (const Drawn& tile : tiles)
-            if (!is_made(tile)) {
-                stale.push_back(&tile);
-                needed += assemble(tile);
-            }
-        const bool keep = std::all_of(tiles.begin(), tiles.end(), [&](const Drawn& tile) {
-            return !is_made(tile) || pool.outlasts(states[static_cast<std::size_t>(tile.slot)].mesh, needed);
-        });
-        if (!keep || !pool.room_for(needed)) {
-            pool.clear();
-            needed = 0;
-            stale.clear();
-            for (const Drawn& tile : tiles) {
-                stale.push_back(&tile);
-                needed += assemble(tile);
-            }
-            for (SlotState& state : states) state.made = false;
-            if (!pool.room_for(needed)) return false;
-        }
-        for (const Drawn* tile : stale) emit(*tile, assemble(*tile));
-        return true;
+            if (!is_made(tile)) emit(tile);
+        return std::all_of(tiles.begin(), tiles.end(), [&](const Drawn& tile) { return is_made(tile); });
     }
 
     bool is_made(const Drawn& tile) const {
