@@ -21,7 +21,7 @@ constexpr std::size_t kLargest = 6 * kCells * kCells;
 /// A tile of level 1 of 2 finest cells a sample, somewhere under an eye.
 class Tile : public testing::Test {
 protected:
-    Tile() : random_(test::seed()), pool_(4 * kLargest, kLargest) {
+    Tile() : random_(test::seed()), pool_(8 * kLargest, 2 * kLargest) {
         lattice_ = *make_lattice(1000, 2000, 5, 4 * kCells, 4 * kCells, kCellsLog2);
         frame_ = make_relative_frame(lattice_, 10, 0.25, {1100.3, 1910.7, 240.1}, 1e-5);
         item_.tile = {1, 1, 0};
@@ -167,6 +167,8 @@ TEST_F(Tile, ACellSplitAcrossItsDiagonalIsRefused) {
     };
     EXPECT_TRUE(with({0, kSouth, kFar, 0, kFar, kEast}));
     EXPECT_FALSE(with({0, kSouth, kEast, kEast, kSouth, kFar}));
+    EXPECT_FALSE(with({0, kSouth, kSouth + 2, 0, kFar, kEast})) << "a triangle that reaches over others";
+    EXPECT_FALSE(with({0, kSouth, kFar, 0, kFar, kEast, 0, 0, kEast})) << "a triangle without area";
 }
 
 }  // namespace
