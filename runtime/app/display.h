@@ -54,7 +54,7 @@ private:
     std::unique_ptr<Renderer> renderer_;
     std::unique_ptr<RenderTarget> target_, inset_;
     std::unique_ptr<CpuArena> arena_;
-    const MeshPool* meshes_ = nullptr;  ///< the scene's
+    const MeshPool* meshes_ = nullptr;    ///< the scene's
     std::uint64_t meshes_passed_on_ = 0;  ///< MeshPool::written() of what the renderer has
     FrameSettings settings_;
     int samples_ = 0;

@@ -84,8 +84,7 @@ Result<void> DrawnTile::set_mesh(const DrawItem& item, std::span<const std::uint
         triangles_.push_back({index(0), index(1), index(2)});
         if (!lay_over_halves(static_cast<std::int32_t>(k / 3)))
             return failed(
-                fmt::format("has a triangle {}, {}, {} that is none of the restricted square grid, or lies over "
-                            "another",
+                fmt::format("has a triangle {}, {}, {} that is no union of halves of cells, or lies over another",
                             index(0), index(1), index(2)));
     }
     const auto bare = std::find(over_half_.begin(), over_half_.end(), -1);

@@ -21,7 +21,8 @@ class DrawnTile {
 public:
     DrawnTile(const Lattice& lattice, const RelativeFrame& frame) : lattice_(lattice), frame_(frame) {}
     /// Takes up another tile, the whole of it. `meshes` holds its mesh; null where it has none. Errors
-    /// (ErrorCode::check_failed): the mesh does not cover the tile once, by triangles of the restricted square grid.
+    /// (ErrorCode::check_failed): the mesh does not cover the tile once, by triangles that are unions of halves of its
+    /// cells (over_half_).
     Result<void> set(const DrawItem& item, std::span<const SlotVertex> vertices, const MeshPool* meshes = nullptr);
     /// The drawn point relative to the eye over (u, v), in finest cells from the tile's north-west corner: exactly so
     /// in plan but for the rounding of float positions. 0 <= u, v <= the tile's extent. After a set() without error.
