@@ -119,7 +119,6 @@ struct Drawn {
     std::int32_t slot = 0;
     std::uint32_t seen_by = 0;
     std::int32_t part_level = 0;  ///< the finest part that it is drawn in
-    double base_error_m = 0;
     Box box;
     std::int64_t views = 0;
     Border border;  ///< own, and what neighbours add
@@ -162,7 +161,7 @@ private:
 struct TileSight {
     double west = 0, north = 0;  ///< of the eye from the tile's corner, samples; south positive
     double spacing_m = 1, eye_z = 0;
-    double error_px = 0, tau_px = 1, half_curvature = 0, base_m = 0;
+    double error_px = 0, tau_px = 1, half_curvature = 0;
 };
 
 }  // namespace
@@ -263,7 +262,6 @@ struct PageMesher::Impl {
                     drawn.item = &item;
                     drawn.slot = item.height_slot;
                     const auto& header = residency.heights.headers[static_cast<std::size_t>(item.height_slot)];
-                    drawn.base_error_m = base_error_m(dataset, header);
                     drawn.box = box_of(item.tile, header.own);
                 }
                 tiles[static_cast<std::size_t>(tile)].seen_by |= 1u << v;
@@ -341,7 +339,6 @@ struct PageMesher::Impl {
         sight.error_px = view.focal_px() * (lod.metric == ErrorMetric::uc ? 1 : view.off_axis_factor());
         sight.tau_px = s.tau_px;
         sight.half_curvature = s.half_curvature;
-        sight.base_m = tile.base_error_m;
         return sight;
     }
 
@@ -356,7 +353,7 @@ struct PageMesher::Impl {
         return {h2, dz * dz};
     }
 
-    // N*K with what the tile itself is off by, and with what flat triangles miss of the earth's curvature: no more than
+    // N*K, with what flat triangles miss of the earth's curvature: no more than
     // half of it at the middle of a hypotenuse 2 l long, l^2 / 2R.
     bool guaranteed(const TileSight& s, std::size_t slot_at, std::int32_t v, int level) const {
         const VertexRecord& record = records[slot_at + static_cast<std::size_t>(v)];
@@ -367,7 +364,7 @@ struct PageMesher::Impl {
         double radius = value_of(record.radius);
         // Curvature lowers the ball's points by other amounts than its centre.
         if (s.half_curvature > 0) radius *= 1 + (2 * std::sqrt(sight.h2) + radius) * s.half_curvature;
-        return guaranteed_selects(s.error_px * (error_m + s.base_m), radius, kMetricFloor, s.tau_px, sight);
+        return guaranteed_selects(s.error_px * error_m, radius, kMetricFloor, s.tau_px, sight);
     }
 
     void choose_guaranteed(const Drawn& tile, std::span<const TileSight> sights, std::uint8_t* active) {
@@ -423,7 +420,6 @@ struct PageMesher::Impl {
             const double distance_m = std::max(distance_to_box(view.eye, tile.box), view.near_m);
             threshold_m = std::min(threshold_m, tau_px * distance_m / (view.focal_px() * view.off_axis_factor()));
         }
-        threshold_m -= tile.base_error_m;
         if (!(threshold_m > 0)) return kLeastRung;
         return static_cast<int>(std::floor(kRungsPerOctave * std::log2(threshold_m)));
     }
