@@ -35,15 +35,17 @@ code { font: .88em ui-monospace, "DejaVu Sans Mono", Menlo, monospace; overflow-
 .scroll { overflow-x: auto; }
 table { border-collapse: collapse; font-size: .88rem; font-variant-numeric: tabular-nums; min-width: 100%; }
 th, td { padding: .3rem .6rem; text-align: right; border-bottom: 1px solid var(--rule); white-space: nowrap; }
-th { color: var(--soft); font-weight: 600; vertical-align: bottom; }
+th { color: var(--soft); font-weight: 600; vertical-align: bottom; white-space: normal; line-height: 1.25; }
 th.l, td.l { text-align: left; }
+.words td { white-space: normal; vertical-align: top; }
+.words td:first-child { white-space: nowrap; }
 tr.loose td { color: var(--soft); }
 td.bad { color: var(--bad); font-weight: 600; }
-.charts { display: grid; grid-template-columns: repeat(auto-fit, minmax(22rem, 1fr)); gap: 1.2rem; }
+.charts { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(30rem, 100%), 1fr)); gap: 1.6rem; }
 figure { margin: 0; }
 figcaption { font-weight: 600; font-size: .95rem; margin-bottom: .2rem; }
 .charts svg { width: 100%; height: auto; display: block; }
-svg text { fill: var(--soft); font: 12px system-ui, -apple-system, "Segoe UI", Roboto, "Noto Sans", sans-serif; }
+svg text { fill: var(--soft); font: 13px system-ui, -apple-system, "Segoe UI", Roboto, "Noto Sans", sans-serif; }
 svg .grid { stroke: var(--rule); stroke-width: 1; }
 svg .front { fill: none; stroke: var(--ink); stroke-width: 9; stroke-opacity: .13; stroke-linejoin: round;
   stroke-linecap: round; }
@@ -55,8 +57,8 @@ svg .ring { fill: none; stroke: var(--ink); stroke-width: 1.5; }
 .curve.loose path.line { stroke-dasharray: 5 4; }
 .curve .mark { fill: currentColor; stroke: var(--page); stroke-width: 1; }
 .curve.loose .mark { fill: var(--page); stroke: currentColor; stroke-width: 1.6; }
-.legend { display: flex; flex-wrap: wrap; gap: .3rem 1.3rem; margin: .8rem 0 0; padding: 0; list-style: none;
-  font-size: .88rem; }
+.legend { display: flex; flex-direction: column; gap: .3rem; margin: 0; padding: 1.6rem 0 0; list-style: none;
+  font-size: .92rem; }
 .legend li { display: flex; align-items: center; gap: .4rem; cursor: default; }
 .legend svg { width: 34px; height: 16px; flex: none; }
 body[data-method] .curve { opacity: .15; }
@@ -64,6 +66,7 @@ body[data-method] .curve.chosen { opacity: 1; }
 .pictures { display: grid; grid-template-columns: repeat(auto-fit, minmax(19rem, 1fr)); gap: 1.2rem; }
 .pictures img { width: 100%; height: auto; display: block; border: 1px solid var(--rule); margin-bottom: 3px; }
 .pictures figcaption { font-weight: 400; font-size: .86rem; }
+dl code { white-space: nowrap; }
 dt { font-weight: 600; margin-top: .7rem; }
 dd { margin: 0; max-width: 48rem; }
 )css";
@@ -236,7 +239,7 @@ private:
     double low_ = std::numeric_limits<double>::infinity(), high_ = 0, from_ = 0, to_ = 1;
 };
 
-constexpr double kWidth = 560, kHeight = 400, kLeft = 62, kRight = 14, kTop = 10, kBottom = 46;
+constexpr double kWidth = 560, kHeight = 390, kLeft = 66, kRight = 14, kTop = 10, kBottom = 48;
 
 std::string point_title(const ComparedCase& c, Cost cost, std::string_view unit) {
     return fmt::format("{}, tau {:g} px: true error {} px, {} {}", escaped(c.what.method), c.what.tau_px,
@@ -317,7 +320,8 @@ std::string legend(const std::vector<Curve>& curves) {
 
 std::string table(const std::vector<std::string>& heads, const std::vector<std::vector<std::string>>& rows,
                   std::size_t text_columns, const std::vector<std::string>& row_classes = {}) {
-    std::string html = "<div class=\"scroll\"><table><thead><tr>";
+    std::string html = fmt::format("<div class=\"scroll\"><table{}><thead><tr>",
+                                   text_columns == heads.size() ? " class=\"words\"" : "");
     const auto side = [&](std::size_t column) { return column < text_columns ? " class=\"l\"" : ""; };
     for (std::size_t k = 0; k < heads.size(); ++k) html += fmt::format("<th{}>{}</th>", side(k), heads[k]);
     html += "</tr></thead><tbody>\n";
@@ -430,50 +434,54 @@ std::string all_cases(const Comparison& comparison, const std::vector<Curve>& cu
                  rows, 1, row_classes);
 }
 
-std::string settings_section(const Comparison& c) {
+std::string quantum_text(const HeightQuantum& q) {
+    if (!(q.error_m > 0)) return "Stored heights may be rounded; those of this store are exact.";
     return fmt::format(
-        "<h2>What each setting trades</h2>\n<dl>\n"
-        "<dt>Tolerance, <code>--tau</code></dt><dd>How far, in pixels, anything drawn may be from the finest data. "
-        "Smaller is "
-        "truer and costs triangles (about 1/tau), pages and drawing time. Below about half a pixel nobody sees the "
-        "gain "
-        "in one picture.</dd>\n"
-        "<dt>Method, <code>--lod</code></dt><dd><code>geomip</code> gives each tile one density: the least thinking, "
-        "more "
-        "triangles; it morphs, so nothing pops. <code>rsg</code> chooses vertex by vertex: the fewest triangles for an "
-        "error, "
-        "the most thinking. <code>block-rsg</code> thins by one threshold a tile, and keeps meshes from frame to "
-        "frame: in "
-        "between.</dd>\n"
-        "<dt>Morphing, <code>--no-morph</code></dt><dd>Morphing moves vertices between densities, so that changes "
-        "glide; the "
-        "picture is then nearer the next coarser one than it need be. Without it single pictures are a little truer, "
-        "and "
-        "changes pop, though never by more than tau.</dd>\n"
-        "<dt>Reuse, <code>--cache exact --s</code></dt><dd>Keeps a mesh while it provably errs by at most tau + s. "
-        "Larger s: "
-        "less thinking, more error. <code>--cache paper</code> keeps meshes by the published test, which proves "
-        "nothing.</dd>\n"
-        "<dt>Metric, <code>--metric uc</code>, <code>deboer</code></dt><dd>The published estimates of a vertex's or "
-        "tile's error. They "
-        "draw less for the same tau, because they see less of the error: compare them by true error, not by tau.</dd>\n"
-        "<dt>Culling, <code>--cull corners</code></dt><dd>As published: tiles none of whose corners are in view are "
-        "not drawn. "
-        "Saves a little and loses ground that is in view: see holes.</dd>\n"
-        "<dt>Cracks, <code>--cracks dike</code></dt><dd>Strips between blocks that share nothing, in place of shared "
-        "edges: "
-        "more triangles.</dd>\n"
-        "<dt>Texture tolerance, <code>--texture-tau</code></dt><dd>How many pixels a texel may cover. Smaller is "
-        "sharper and "
-        "costs memory (1/tau&sup2;); below 1 there are more texels than pixels.</dd>\n"
-        "<dt>Budget, <code>--budget</code></dt><dd>The ceiling of tile memory. Where it binds, the tolerance is raised "
-        "as far as "
-        "needed, evenly, and the promise with it.</dd>\n"
-        "<dt>Height quantum (<code>scree build --height-quantum</code>)</dt><dd>Stored heights are rounded; this store "
-        "states at "
-        "most {:.4g} m. The nearest drawn vertex of this path was {} m away: seen from there, at most {} px, which no "
-        "other figure of this page counts. A coarser quantum makes smaller files.</dd>\n</dl>\n",
-        c.quantum.error_m, number(c.quantum.nearest_m), number(c.quantum.error_px));
+        "Stored heights are rounded, here by at most {:.4g} m. The nearest drawn vertex of this path was {} m away: "
+        "seen "
+        "from there, at most {} px, which no other figure of this page counts. A coarser quantum makes smaller files.",
+        q.error_m, number(q.nearest_m), number(q.error_px));
+}
+
+std::string settings_section(const Comparison& c) {
+    constexpr std::array<std::array<std::string_view, 3>, 9> kSettings{{
+        {"Tolerance", "--tau",
+         "How far, in pixels, anything drawn may be from the finest data. Smaller is truer and costs triangles (about "
+         "1/tau), pages and drawing time."},
+        {"Method", "--lod",
+         "<code>geomip</code> gives each tile one density: the least thinking, the most triangles; it morphs, so "
+         "nothing "
+         "pops. <code>rsg</code> chooses vertex by vertex: the fewest triangles for an error, the most thinking. "
+         "<code>block-rsg</code> thins by one threshold a tile and keeps meshes from frame to frame: in between."},
+        {"Morphing", "--no-morph",
+         "Morphing moves vertices between densities, so that changes glide; each picture is then nearer to the next "
+         "coarser "
+         "one than it need be. Without it single pictures are a little truer, and changes pop."},
+        {"Reuse", "--cache exact --s",
+         "Keeps a mesh while it provably errs by at most tau + s. Larger s: less thinking, more error. <code>--cache "
+         "paper</code> keeps meshes by the published test, which proves nothing."},
+        {"Metric", "--metric uc, deboer",
+         "The published estimates of a vertex's or a tile's error. They draw less for the same tau because they see "
+         "less "
+         "of the error: compare them by true error, not by tau."},
+        {"Culling", "--cull corners",
+         "As published: a tile none of whose corners is in view is not drawn. Loses ground that is in view: see "
+         "holes."},
+        {"Cracks", "--cracks dike",
+         "As published: strips between blocks that share nothing, in place of shared edges."},
+        {"Texture tolerance", "--texture-tau",
+         "How many pixels a texel may cover. Smaller is sharper and costs memory (1/tau&sup2;); below 1 there are more "
+         "texels than pixels."},
+        {"Budget", "--budget",
+         "The ceiling of tile memory. Where it binds, the tolerance is raised as far as needed, evenly, and the "
+         "promise "
+         "with it."},
+    }};
+    std::string html = "<h2>What each setting trades</h2>\n<dl>\n";
+    for (const auto& [name, option, text] : kSettings)
+        html += fmt::format("<dt>{}, <code>{}</code></dt><dd>{}</dd>\n", name, option, text);
+    return html + fmt::format("<dt>Height quantum, <code>scree build --height-quantum</code></dt><dd>{}</dd>\n</dl>\n",
+                              quantum_text(c.quantum));
 }
 
 std::string how_section(const Comparison& c) {
@@ -545,7 +553,7 @@ Result<std::string> comparison_page(const Comparison& c, const std::optional<Wis
     html += chart(c, curves, Cost::triangles, "Triangles", "triangles a frame, mean", "triangles");
     html += chart(c, curves, Cost::frame_ms, "Selection and drawing", "frame, milliseconds", "ms");
     html += chart(c, curves, Cost::lod_ms, "Selection alone", "LOD, CPU milliseconds", "ms");
-    html += "</div>\n" + legend(curves) + *pictures;
+    html += legend(curves) + "</div>\n" + *pictures;
     html += "<h2>Texture tolerance</h2>\n<p>Against full resolution in heights and textures.</p>\n" +
             sweep_table(c, Sweep::texture);
     html +=

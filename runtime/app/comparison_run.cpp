@@ -295,13 +295,15 @@ private:
         const Dataset& d = setup_.store->dataset();
         const DrawList& draws = frame.selection->draws[0];
         const CpuArena& arena = *rig.display->arena();
+        const MeshPool* meshes = rig.scene->meshes();
         CaseLog& log = logs_[at];
         CaseFigures& f = log.figures;
         ErrorHistogram errors;
-        if (auto ok = audit_frame(*setup_.store, *reader_, {eye, draws, arena, frame.half_curvature}, errors); !ok)
+        if (auto ok = audit_frame(*setup_.store, *reader_, {eye, draws, arena, frame.half_curvature, meshes}, errors);
+            !ok)
             return ok;
         log.errors.merge(errors);
-        const DrawnMesh mesh = drawn_mesh(d, patterns_, draws, arena);
+        const DrawnMesh mesh = drawn_mesh(d, patterns_, draws, arena, meshes);
         note_nearest(mesh, eye);
         const CrackReport cracks = count_cracks(d, draws, mesh);
         const std::int64_t holes = count_holes(d, rig.scene->pager().residency(), eye, draws, frame.half_curvature);

@@ -12,25 +12,24 @@ constexpr int kRadius = 5;
 constexpr double kSigma = 1.5;
 constexpr double kC1 = 0.01 * 255 * 0.01 * 255, kC2 = 0.03 * 255 * 0.03 * 255;
 
+// Doubles: a variance is a small difference of squares.
 struct Plane {
     int width = 0, height = 0;
-    std::vector<float> values;
-    float* row(int y) { return values.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(width); }
-    const float* row(int y) const {
+    std::vector<double> values;
+    double* row(int y) { return values.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(width); }
+    const double* row(int y) const {
         return values.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(width);
     }
 };
 
 Plane plane_of(int width, int height) {
-    return {width, height, std::vector<float>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height))};
+    return {width, height, std::vector<double>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height))};
 }
 
-// Centred on the middle of the range, so that floats keep the variance of nearly even windows.
 Plane luma(int width, int height, std::span<const std::uint8_t> rgb) {
     Plane plane = plane_of(width, height);
     for (std::size_t k = 0; k < plane.values.size(); ++k)
-        plane.values[k] =
-            static_cast<float>(0.299 * rgb[3 * k] + 0.587 * rgb[3 * k + 1] + 0.114 * rgb[3 * k + 2] - 128);
+        plane.values[k] = 0.299 * rgb[3 * k] + 0.587 * rgb[3 * k + 1] + 0.114 * rgb[3 * k + 2];
     return plane;
 }
 
@@ -40,32 +39,32 @@ Plane product(const Plane& a, const Plane& b) {
     return p;
 }
 
-std::vector<float> window(int length) {
-    std::vector<float> w(static_cast<std::size_t>(length));
+std::vector<double> window(int length) {
+    std::vector<double> w(static_cast<std::size_t>(length));
     double sum = 0;
     const auto weight = [&](int k) {
         const double x = k - (length - 1) / 2.0;
         return std::exp(-x * x / (2 * kSigma * kSigma));
     };
     for (int k = 0; k < length; ++k) sum += weight(k);
-    for (int k = 0; k < length; ++k) w[static_cast<std::size_t>(k)] = static_cast<float>(weight(k) / sum);
+    for (int k = 0; k < length; ++k) w[static_cast<std::size_t>(k)] = weight(k) / sum;
     return w;
 }
 
 // Weighted means over the windows that lie inside.
-Plane blurred(const Plane& p, const std::vector<float>& across, const std::vector<float>& down) {
+Plane blurred(const Plane& p, const std::vector<double>& across, const std::vector<double>& down) {
     Plane rows = plane_of(p.width - static_cast<int>(across.size()) + 1, p.height);
     for (int y = 0; y < rows.height; ++y)
         for (std::size_t k = 0; k < across.size(); ++k) {
-            const float* from = p.row(y) + k;
-            float* to = rows.row(y);
+            const double* from = p.row(y) + k;
+            double* to = rows.row(y);
             for (int x = 0; x < rows.width; ++x) to[x] += across[k] * from[x];
         }
     Plane all = plane_of(rows.width, rows.height - static_cast<int>(down.size()) + 1);
     for (int y = 0; y < all.height; ++y)
         for (std::size_t k = 0; k < down.size(); ++k) {
-            const float* from = rows.row(y + static_cast<int>(k));
-            float* to = all.row(y);
+            const double* from = rows.row(y + static_cast<int>(k));
+            double* to = all.row(y);
             for (int x = 0; x < all.width; ++x) to[x] += down[k] * from[x];
         }
     return all;
@@ -91,8 +90,8 @@ double psnr_db(double mse) {
 double ssim(int width, int height, std::span<const std::uint8_t> rgb_a, std::span<const std::uint8_t> rgb_b) {
     assert(width >= 1 && height >= 1 && rgb_a.size() == rgb_b.size());
     assert(rgb_a.size() == 3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
-    const std::vector<float> across = window(std::min(width, 2 * kRadius + 1)),
-                             down = window(std::min(height, 2 * kRadius + 1));
+    const std::vector<double> across = window(std::min(width, 2 * kRadius + 1)),
+                              down = window(std::min(height, 2 * kRadius + 1));
     const Plane a = luma(width, height, rgb_a), b = luma(width, height, rgb_b);
     const Plane mean_a = blurred(a, across, down), mean_b = blurred(b, across, down),
                 square_a = blurred(product(a, a), across, down), square_b = blurred(product(b, b), across, down),
@@ -102,9 +101,8 @@ double ssim(int width, int height, std::span<const std::uint8_t> rgb_a, std::spa
         const double ma = mean_a.values[k], mb = mean_b.values[k];
         const double variance_a = std::max(0.0, square_a.values[k] - ma * ma),
                      variance_b = std::max(0.0, square_b.values[k] - mb * mb), covariance = both.values[k] - ma * mb;
-        const double la = ma + 128, lb = mb + 128;
-        sum += (2 * la * lb + kC1) * (2 * covariance + kC2) /
-               ((la * la + lb * lb + kC1) * (variance_a + variance_b + kC2));
+        sum += (2 * ma * mb + kC1) * (2 * covariance + kC2) /
+               ((ma * ma + mb * mb + kC1) * (variance_a + variance_b + kC2));
     }
     return sum / static_cast<double>(mean_a.values.size());
 }
