@@ -145,6 +145,8 @@ Result<Comparison> measure(const ViewOptions& o, const CompareOptions& c) {
     ComparisonSetup setup;
     setup.store = std::move(*store);
     setup.scene = scene_options(o);
+    // What the command's own options cannot have is no case to pass over.
+    if (auto scene = Scene::open(setup.store, setup.scene); !scene) return scene.error();
     auto path = flight_of(*setup.store, o, c.frames);
     if (!path) return path.error();
     setup.path = std::move(*path);

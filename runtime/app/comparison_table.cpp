@@ -60,28 +60,30 @@ std::string cell(const Json& value) {
     return fmt::format("{:.6g}", value.get<double>());
 }
 
-Json short_report(const Comparison& comparison, std::optional<std::size_t> at) {
-    if (!at) return nullptr;
+// Nothing where there is no such case.
+void add_short_report(Json& to, const char* key, const Comparison& comparison, std::optional<std::size_t> at) {
+    if (!at) return;
     const ComparedCase& c = comparison.cases[*at];
-    return {{"method", c.what.method},
-            {"options", options_of(c.what)},
-            {"promised_px", finite(c.promised_px())},
-            {"true_max_px", finite(c.figures.true_max_px)},
-            {"triangles_mean", c.figures.triangles_mean},
-            {"frame_ms", c.figures.frame_ms},
-            {"frame_p99_ms", c.figures.frame_p99_ms}};
+    to[key] = {{"method", c.what.method},
+               {"options", options_of(c.what)},
+               {"promised_px", finite(c.promised_px())},
+               {"true_max_px", finite(c.figures.true_max_px)},
+               {"triangles_mean", c.figures.triangles_mean},
+               {"frame_ms", c.figures.frame_ms},
+               {"frame_p99_ms", c.figures.frame_p99_ms}};
 }
 
 Json cheapest_report(const Comparison& comparison) {
     Json rows = Json::array();
     for (const double error_px : kErrors_px) {
-        const auto by = [&](Cost cost, bool guaranteed) {
-            return short_report(comparison, cheapest_within(comparison.cases, error_px, cost, guaranteed));
+        const auto cheapest = [&](Cost cost, bool guaranteed) {
+            return cheapest_within(comparison.cases, error_px, cost, guaranteed);
         };
-        rows.push_back({{"error_px", error_px},
-                        {"by_frame_ms", by(Cost::frame_ms, true)},
-                        {"by_triangles", by(Cost::triangles, true)},
-                        {"without_promise_by_frame_ms", by(Cost::frame_ms, false)}});
+        Json row = {{"error_px", error_px}};
+        add_short_report(row, "by_frame_ms", comparison, cheapest(Cost::frame_ms, true));
+        add_short_report(row, "by_triangles", comparison, cheapest(Cost::triangles, true));
+        add_short_report(row, "without_promise_by_frame_ms", comparison, cheapest(Cost::frame_ms, false));
+        rows.push_back(row);
     }
     return rows;
 }
@@ -142,12 +144,10 @@ nlohmann::ordered_json comparison_json(const Comparison& c, const std::optional<
     for (const ComparedCase& one : c.cases) report["cases"].push_back(report_of(one));
     if (wish) {
         const Recommendation r = recommend(c.cases, *wish);
-        report["recommendation"] = {{"fps", wish->fps},
-                                    {"max_error_px", wish->most_error_px},
-                                    {"fits", r.fits},
-                                    {"reason", r.reason},
-                                    {"best", short_report(c, r.best)},
-                                    {"cheaper_on_this_path", short_report(c, r.cheaper_here)}};
+        Json& said = report["recommendation"] = {
+            {"fps", wish->fps}, {"max_error_px", wish->most_error_px}, {"fits", r.fits}, {"reason", r.reason}};
+        add_short_report(said, "best", c, r.best);
+        add_short_report(said, "cheaper_on_this_path", c, r.cheaper_here);
     }
     report["kept"] = c.kept();
     return report;
