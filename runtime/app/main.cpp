@@ -1,4 +1,5 @@
-// scree-view: the runtime program. `scree-view STORE` opens the window; shot, fly and audit are commands.
+// scree-view: the runtime program. `scree-view STORE` opens the window, as `scree-view view STORE` does; shot, fly,
+// audit and compare are commands.
 #include <fmt/format.h>
 
 #include <array>
@@ -17,8 +18,11 @@ struct Command {
     int (*run)(int, char**);
 };
 
-constexpr std::array<Command, 3> kCommands{
-    {{"shot", scree::run_shot}, {"fly", scree::run_fly}, {"audit", scree::run_audit}}};
+constexpr std::array<Command, 5> kCommands{{{"view", scree::run_view},
+                                            {"shot", scree::run_shot},
+                                            {"fly", scree::run_fly},
+                                            {"audit", scree::run_audit},
+                                            {"compare", scree::run_compare}}};
 
 int dispatch(int argc, char** argv) {
     const std::string_view name = argc > 1 ? argv[1] : "";

@@ -46,7 +46,7 @@ TEST_F(ExitCodes, HelpIsZeroForEveryCommand) {
         EXPECT_EQ(run.exit_code, 0) << describe(run);
         EXPECT_NE(run.out.find("--json"), std::string::npos) << describe(run);
     }
-    for (const char* command : {"shot", "fly", "audit"}) {
+    for (const char* command : {"view", "shot", "fly", "audit", "compare"}) {
         const auto run = scree_view({command, "--help"});
         EXPECT_EQ(run.exit_code, 0) << describe(run);
         EXPECT_NE(run.out.find("--json"), std::string::npos) << describe(run);

@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "common/process_usage.h"
+#include "common/progress.h"
 #include "common/report.h"
 #include "common/store/byte_io.h"
 #include "tools/cli/height_options.h"
@@ -26,7 +27,6 @@
 #include "tools/mosaic/sample_positions.h"
 #include "tools/mosaic/visible_samples.h"
 #include "tools/partial_file.h"
-#include "tools/progress.h"
 #include "tools/source/isolated_decoder.h"
 
 namespace scree {

@@ -5,8 +5,8 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "common/progress.h"
 #include "common/report.h"
-#include "tools/progress.h"
 #include "tools/source/synth.h"
 
 namespace scree {
