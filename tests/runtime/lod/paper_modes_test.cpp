@@ -239,6 +239,7 @@ TEST(CornerCulling, DrawsWhatTheBoxTestDrawsButTilesWithoutACornerInView) {
                     ASSERT_TRUE(corner_in_view(terrain, cameras[v], part.tile, settings.half_curvature));
             }
             ASSERT_EQ(some.culled, lost);
+            ASSERT_EQ(some.nodes, static_cast<std::int64_t>(test::drawn_together(some).size()));
             ASSERT_EQ(all.culled, 0);
             ASSERT_LE(some.max_bound_px, all.max_bound_px);
             ASSERT_EQ(some.planned_heights, all.planned_heights);
