@@ -30,7 +30,7 @@ struct PagerOptions {
     int latency_ms = 0;    ///< every read is delayed by this: to try slow disks
     bool textures = true;  ///< false: heights alone (audit)
     /// Where there is one, the sink gets what it finds out about every height tile.
-    std::shared_ptr<const TileMeasure> measure;
+    std::shared_ptr<const TileMeasure> measure{};
     /// Residency keeps the level corrections of height tiles; each height slot takes corrections_cost() more.
     bool corrections = false;
 };
