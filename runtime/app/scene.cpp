@@ -92,8 +92,10 @@ void Scene::make_selectors() {
 }
 
 Result<MemoryPlan> Scene::plan_of(const Dataset& dataset, const SceneOptions& options) {
-    const bool meshed = options.lod.method != LodMethod::geomip;
-    return plan_memory(dataset, options.budget_bytes, 2, meshed ? PageMesher::slot_cost(dataset) : 0);
+    std::int64_t more_per_height = 0;
+    if (options.lod.method != LodMethod::geomip) more_per_height = PageMesher::slot_cost(dataset);
+    if (options.lod.metric == ErrorMetric::deboer) more_per_height = Pager::corrections_cost();
+    return plan_memory(dataset, options.budget_bytes, 2, more_per_height);
 }
 
 void Scene::make_mesher() {
@@ -131,6 +133,7 @@ Result<void> Scene::start(TileSink& sink) {
 Result<void> Scene::make_pager() {
     for (int tries = 1;; ++tries) {
         PagerOptions pager_options{memory_, options_.loader_threads, options_.latency_ms, options_.textures, {}};
+        pager_options.corrections = options_.lod.metric == ErrorMetric::deboer;
         if (mesher_)
             pager_options.measure =
                 std::make_shared<PageMeasure>(dataset().lattice.tile_cells_log2, options_.lod.metric);
@@ -263,7 +266,9 @@ SelectionSettings Scene::selection_settings(double half_curvature, double growth
             half_curvature,
             options_.morph && !meshed,
             growth_s,
-            moved_m_};
+            moved_m_,
+            options_.lod.metric,
+            options_.lod.culling};
 }
 
 void Scene::note_motion(std::span<const Camera> views, double now_s) {

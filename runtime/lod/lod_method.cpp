@@ -107,8 +107,8 @@ std::string command_line_of(const LodSettings& s) {
 
 // A method that can be drawn has its line here.
 bool is_built_in(const LodSettings& s) {
-    if (s.culling != Culling::box || s.cracks != CrackFix::stitch) return false;
-    return s.method != LodMethod::geomip || s.metric == ErrorMetric::guaranteed;
+    if (s.cracks != CrackFix::stitch) return false;
+    return s.method != LodMethod::geomip || s.metric != ErrorMetric::uc;
 }
 
 Result<void> expect_built_in(const LodSettings& s) {

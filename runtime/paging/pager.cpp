@@ -30,6 +30,7 @@ Pager::Tables::Tables(const PagerOptions& options, const Lattice& lattice, TileC
     : heights(options.memory.height_slots, lattice, residency.heights, slots),
       textures(options.textures ? options.memory.texture_slots : 0, lattice, residency.textures, slots) {
     residency.has_textures = options.textures;
+    if (options.corrections) residency.heights.corrections.resize(static_cast<std::size_t>(heights.capacity()));
 }
 
 bool Pager::Tables::adds_up() const {
@@ -115,7 +116,11 @@ void Pager::put(const LoadedTile& tile, double arrived_s) {
     } else {
         sink_.put_texture(tile.job.slot, tile.blocks);
     }
-    cache(tile.job.kind).complete(tile.job.slot, tile.header, arrived_s);
+    Tables& tables = loaded();
+    tables.of(tile.job.kind).complete(tile.job.slot, tile.header, arrived_s);
+    if (tile.job.kind == TileKind::height && options_.corrections)
+        tables.residency.heights.corrections[static_cast<std::size_t>(tile.job.slot)] =
+            level_corrections(tile.vertices, store_->dataset().lattice.tile_cells_log2);
 }
 
 void Pager::report_damage(const LoadedTile& tile) {
