@@ -23,6 +23,8 @@ constexpr double kMetricFloor = 0.3;
 constexpr double kRungsPerOctave = 8;
 constexpr int kNoRung = std::numeric_limits<int>::min();
 constexpr int kLeastRung = kNoRung + 1;  ///< threshold 0: whatever has an error at all
+/// Above every error: an eye may stand so far off that its distance is infinite.
+constexpr double kGreatestThreshold_m = 1e30;
 /// Where meshes do not fit into the pool the tolerance grows by eighths of an octave.
 constexpr double kCoarsening = 1.0905077326652577;
 constexpr int kMostCoarsening = 400;
@@ -420,6 +422,7 @@ struct PageMesher::Impl {
             const double distance_m = std::max(distance_to_box(view.eye, tile.box), view.near_m);
             threshold_m = std::min(threshold_m, tau_px * distance_m / (view.focal_px() * view.off_axis_factor()));
         }
+        threshold_m = std::min(threshold_m, kGreatestThreshold_m);
         if (!(threshold_m > 0)) return kLeastRung;
         return static_cast<int>(std::floor(kRungsPerOctave * std::log2(threshold_m)));
     }

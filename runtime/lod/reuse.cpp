@@ -34,23 +34,23 @@ EyeToBox eye_to_box(const glm::dvec3& eye, const Box& box) {
 
 bool reuse_t1(const EyeToBox& then, const EyeToBox& now, double moved_m, const ReuseAllowance& a) {
     if (moved_m == 0) return true;
-    if (!(then.level_m > 0 && now.level_m > 0 && a.s_px > 0)) return false;
-    // moved^2 tau (tau + s) <= h0 h1 s^2: tau = 0 allows any motion.
-    return moved_m * moved_m * a.tau_px * (a.tau_px + a.s_px) <= then.level_m * now.level_m * a.s_px * a.s_px;
+    if (!(then.level_m > 0 && now.level_m > 0 && a.s_px > 0 && std::isfinite(moved_m))) return false;
+    // moved^2 tau (tau + s) <= h0 h1 s^2, in roots: the products may overflow. tau = 0 allows any motion.
+    return moved_m * std::sqrt(a.tau_px) * std::sqrt(a.tau_px + a.s_px) <=
+           std::sqrt(then.level_m) * std::sqrt(now.level_m) * a.s_px;
 }
 
 bool reuse_t2(const EyeToBox& now, double moved_m, const ReuseAllowance& a) {
     if (moved_m == 0) return true;
-    if (!(now.distance_m > 0 && a.s_px > 0)) return false;
+    if (!(now.distance_m > 0 && a.s_px > 0 && std::isfinite(moved_m))) return false;
     return moved_m * a.tau_px <= a.s_px * now.distance_m;
 }
 
 bool reuse_t3(const EyeToBox& then, const EyeToBox& now, double moved_m, double c, const ReuseAllowance& a) {
     if (moved_m == 0) return true;
     const double before = floored(then, c), after = floored(now, c);
-    if (!(before > 0 && after > 0 && a.s_px > 0)) return false;
-    const double q = a.q();
-    const double mean = std::isinf(q) ? 0 : std::sqrt(before * after / q);
+    if (!(before > 0 && after > 0 && a.s_px > 0 && std::isfinite(moved_m))) return false;
+    const double mean = std::sqrt(before) * std::sqrt(after) / std::sqrt(a.q());  // 0 where q is infinite
     return moved_m <= before + after - 2 * mean;
 }
 

@@ -17,7 +17,8 @@ struct VertexSight {
 };
 
 /// Ueng & Chuang, eq. of section 1.1: f^2 delta^2 h^2 > tau^2 (h^2 + dz^2)^2. `f_delta` = f delta. A vertex straight
-/// under the eye (h = 0) is never selected; an overflow of r^4 passes.
+/// under the eye (h = 0) is never selected; an overflow of (tau r^2)^2 passes: in float from tau r^2 = 1.8e19 px m^2
+/// on, where no terrain has a correction to show (4 million km at a pixel).
 template <class Real>
 bool uc_selects(Real f_delta, Real tau, VertexSight<Real> s) {
     const Real r2 = s.r2();

@@ -29,8 +29,8 @@ SyntheticTerrain::SyntheticTerrain(const TerrainShape& shape, HeightFunction hei
       error_growth_(shape.error_growth),
       depth_(shape.depth),
       texture_depth_(shape.texture_depth_map) {
-    auto lattice =
-        make_lattice(300000.5, 2700000.25, shape.spacing_m, shape.cells_x, shape.cells_y, shape.tile_cells_log2);
+    auto lattice = make_lattice(shape.origin_x_m, shape.origin_y_m, shape.spacing_m, shape.cells_x, shape.cells_y,
+                                shape.tile_cells_log2);
     EXPECT_TRUE(lattice.ok());
     dataset_.lattice = *lattice;
     dataset_.height_offset_m = 50;

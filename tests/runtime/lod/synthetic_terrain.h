@@ -29,6 +29,8 @@ struct TerrainShape {
     int tile_cells_log2 = 3;
     std::int64_t cells_x = 64;
     std::int64_t cells_y = 64;
+    double origin_x_m = 300000.5;
+    double origin_y_m = 2700000.25;
     double spacing_m = 10;
     double quantum_m = 0.25;
     /// 0: one texture a root, so that pages are split for geometry alone. May pass the heights' depth by
