@@ -484,7 +484,8 @@ const BlockFrame& BlockWorld::select(const Camera& camera, const BlockRules& rul
         Block& block = blocks_[static_cast<std::size_t>(index)];
         block.seen_in_frame = frame_number_;
         const EyeToBox now = eye_to_box(camera.eye, bound_box(block));
-        if (may_reuse(index, now, camera.eye)) {
+        block.reused = may_reuse(index, now, camera.eye);
+        if (block.reused) {
             ++frame_.reused;
         } else {
             regenerate(index, sighting);

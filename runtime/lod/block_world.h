@@ -75,6 +75,9 @@ public:
 
     const BlockFrame& select(const Camera& camera, const BlockRules& rules);
 
+    /// Every block is selected anew when next in view, as after a leap.
+    void forget() { ++generation_; }
+
     int columns() const { return columns_; }
     int rows() const { return rows_; }
     int block_count() const { return columns_ * rows_; }
@@ -106,6 +109,8 @@ public:
 
     // For judging frames.
     std::span<const std::uint8_t> active(int block) const;
+    /// In the last frame that it was drawn in.
+    bool was_reused(int block) const { return blocks_[static_cast<std::size_t>(block)].reused; }
     /// What a block would select for this eye with no cache: parents of selected vertices included.
     void select_anew(int block, const Camera& camera, const BlockRules& rules, std::span<std::uint8_t> active) const;
     /// Of a vertex of the block: the paper's local correction; the saturated error. Metres.
@@ -133,6 +138,7 @@ private:
         std::array<std::uint64_t, 4> sides{};  ///< active vertices: west, east, north, south
         std::uint32_t version = 0;
         std::uint32_t seen_in_frame = 0;
+        bool reused = false;
         std::vector<std::uint32_t> mesh;
     };
     struct Strip {
