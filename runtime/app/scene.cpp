@@ -92,10 +92,11 @@ void Scene::make_selectors() {
 }
 
 Result<MemoryPlan> Scene::plan_of(const Dataset& dataset, const SceneOptions& options) {
-    std::int64_t more_per_height = 0;
-    if (options.lod.method != LodMethod::geomip) more_per_height = PageMesher::slot_cost(dataset);
-    if (options.lod.metric == ErrorMetric::deboer) more_per_height = Pager::corrections_cost();
-    return plan_memory(dataset, options.budget_bytes, 2, more_per_height);
+    MoreMemory more;
+    if (options.lod.method != LodMethod::geomip)
+        more = {PageMesher::slot_cost(dataset), PageMesher::fixed_cost(dataset)};
+    if (options.lod.metric == ErrorMetric::deboer) more.per_height_slot = Pager::corrections_cost();
+    return plan_memory(dataset, options.budget_bytes, 2, more);
 }
 
 void Scene::make_mesher() {

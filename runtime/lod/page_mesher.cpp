@@ -32,9 +32,11 @@ constexpr int kMostCoarsening = 400;
 constexpr std::uint8_t kActive = 1, kRejected = 2;
 /// Eyes kept of a tile's last choice; with more views nothing is reused.
 constexpr std::size_t kMostEyes = 4;
-/// A height slot's share in the pool, of the 3 * 2 * m^2 indices of a tile with nothing dropped: what an eighth of them
-/// comes to where half of the slots are drawn.
-constexpr std::size_t kPoolShare = 16;
+/// A tile with more of its vertices than this has all of them: it is drawn by its pattern, which takes no memory.
+constexpr double kWholeShare = 0.6;
+/// A height slot's share in the pool, of the 3 * 2 * m^2 indices of a tile with nothing dropped: what a quarter of them
+/// comes to where half of the slots are drawn. So many tiles have room for all.
+constexpr std::size_t kPoolShare = 8, kRoomyTiles = 64;
 
 // Sides by Direction: the place of the k-th sample along a side, and the neighbour's opposite side.
 constexpr std::int32_t side_index(int side, int k, int m) {
@@ -108,9 +110,10 @@ struct Chosen {
 // What is kept of a height slot.
 struct SlotState {
     Chosen chosen;
-    Border own;         ///< of what was chosen
-    Border drawn;       ///< with what neighbours added, of `mesh`
-    bool made = false;  ///< `mesh` is of what was chosen last and of `drawn`
+    Border own;          ///< of what was chosen
+    Border drawn;        ///< with what neighbours added, of `mesh`
+    bool made = false;   ///< `mesh` is of what was chosen last and of `drawn`
+    bool whole = false;  ///< nothing is dropped: drawn by its pattern
     MeshRange mesh;
     std::vector<std::uint32_t> cell_starts;  ///< of its parts' cells in the mesh, Morton order, and the end
 };
@@ -473,6 +476,17 @@ struct PageMesher::Impl {
                  {box.high.x, box.low.y, z(m, m)}}};
     }
 
+    bool complete_if_dense(const DrawItem& item, std::uint8_t* active) const {
+        std::size_t count = 0;
+        for (std::size_t v = 0; v < vertices; ++v) count += active[v];
+        const int side = (m >> item.geomip) + 1;
+        if (static_cast<double>(count) <= kWholeShare * side * side) return false;
+        const Bisection& b = bisection_of(item.tile);
+        for (const std::int32_t v : b.coarse_to_fine())
+            if (may_have(item, v, b.vertex(v).level)) active[v] = kActive;
+        return true;
+    }
+
     // Parts of a tile are drawn apart: the lines between them must be edges.
     void add_parts(const Bisection& b, int part_level, std::uint8_t* active) const {
         const int stride = m >> part_level;
@@ -507,8 +521,9 @@ struct PageMesher::Impl {
                 choose_guaranteed(tile, used, active);
         }
         for (std::size_t v = 0; v < vertices; ++v) active[v] &= kActive;
-        add_parts(b, tile.part_level, active);
         SlotState& state = states[static_cast<std::size_t>(tile.slot)];
+        state.whole = complete_if_dense(*tile.item, active);
+        add_parts(b, tile.part_level, active);
         state.own = border_of(active);
         state.made = false;
         c = {true,
@@ -703,24 +718,34 @@ struct PageMesher::Impl {
 
     bool is_made(const Drawn& tile) const {
         const SlotState& state = states[static_cast<std::size_t>(tile.slot)];
+        if (state.whole) return true;
         return state.made && state.drawn == tile.border && pool.holds(state.mesh);
     }
 
     void hand_over(Selection& selection) {
         for (DrawList& list : selection.draws)
-            for (DrawItem& item : list) item.mesh = states[static_cast<std::size_t>(item.height_slot)].mesh;
+            for (DrawItem& item : list) item.mesh = mesh_of(item);
         for (DrawList& list : selection.parts)
             for (DrawItem& item : list) item.mesh = part_of(item);
         selection.triangles = 0;
-        for (const Drawn& tile : tiles)
-            selection.triangles += tile.views * states[static_cast<std::size_t>(tile.slot)].mesh.count / 3;
+        for (const Drawn& tile : tiles) selection.triangles += tile.views * triangles_of(tile);
         counters.triangles = selection.triangles;
+    }
+
+    MeshRange mesh_of(const DrawItem& item) const {
+        const SlotState& state = states[static_cast<std::size_t>(item.height_slot)];
+        return state.whole ? MeshRange{} : state.mesh;
+    }
+
+    std::int64_t triangles_of(const Drawn& tile) const {
+        const SlotState& state = states[static_cast<std::size_t>(tile.slot)];
+        return state.whole ? pattern_triangles(n, tile.item->geomip, tile.item->edge_mask) : state.mesh.count / 3;
     }
 
     // The cells of a part stand together.
     MeshRange part_of(const DrawItem& item) const {
         const SlotState& state = states[static_cast<std::size_t>(item.height_slot)];
-        if (state.cell_starts.empty()) return state.mesh;
+        if (state.whole || state.cell_starts.empty()) return mesh_of(item);
         const int finer = std::countr_zero(state.cell_starts.size() - 1) / 2 - item.part.level;
         std::size_t first = 0;
         for (int bit = item.part.level; bit-- > 0;)
@@ -757,9 +782,18 @@ struct PageMesher::Impl {
 
 namespace {
 
+/// The pool stands here and, shorter, in the renderer.
+constexpr std::size_t kIndexBytes = 2 * sizeof(std::uint32_t);
+
+std::size_t most_indices(const Dataset& dataset) {
+    const std::size_t cells = std::size_t{1} << dataset.lattice.tile_cells_log2;
+    return 6 * cells * cells;
+}
+
 MeshPool pool_of(const Dataset& dataset, std::int64_t height_slots) {
-    const std::size_t cells = std::size_t{1} << dataset.lattice.tile_cells_log2, most = 6 * cells * cells;
-    return MeshPool(std::max(static_cast<std::size_t>(height_slots) * most / kPoolShare, most), most);
+    const std::size_t most = most_indices(dataset);
+    const auto slots = static_cast<std::size_t>(height_slots);
+    return MeshPool(std::max(slots * most / kPoolShare, std::min(slots, kRoomyTiles) * most), most);
 }
 
 }  // namespace
@@ -787,11 +821,13 @@ const MeshCounters& PageMesher::counters() const { return impl_->counters; }
 
 std::int64_t PageMesher::slot_cost(const Dataset& dataset) {
     const std::size_t vertices = slot_vertex_count(dataset.lattice.tile_cells_log2);
-    const std::size_t cells = std::size_t{1} << dataset.lattice.tile_cells_log2;
-    const std::size_t indices = 6 * cells * cells / kPoolShare;
-    // The pool stands here and in the renderer.
-    return static_cast<std::int64_t>(vertices * (sizeof(VertexRecord) + 1) + indices * 2 * sizeof(std::uint32_t) +
-                                     sizeof(SlotState) + sizeof(Drawn));
+    return static_cast<std::int64_t>(vertices * (sizeof(VertexRecord) + 1) +
+                                     most_indices(dataset) / kPoolShare * kIndexBytes + sizeof(SlotState) +
+                                     sizeof(Drawn) + 6 * sizeof(Link));
+}
+
+std::int64_t PageMesher::fixed_cost(const Dataset& dataset) {
+    return static_cast<std::int64_t>(kRoomyTiles * most_indices(dataset) * kIndexBytes);
 }
 
 }  // namespace scree

@@ -55,8 +55,9 @@ public:
     const MeshPool& pool() const { return pool_; }
     const MeshCounters& counters() const;  ///< of the last mesh()
 
-    /// Bytes for each height slot, the pool's included.
+    /// Bytes for each height slot, and besides them; the renderer's copy of the meshes is counted.
     static std::int64_t slot_cost(const Dataset& dataset);
+    static std::int64_t fixed_cost(const Dataset& dataset);
 
 private:
     struct Impl;
