@@ -38,7 +38,7 @@ th, td { padding: .3rem .6rem; text-align: right; border-bottom: 1px solid var(-
 th { color: var(--soft); font-weight: 600; vertical-align: bottom; white-space: normal; line-height: 1.25; }
 th.l, td.l { text-align: left; }
 .words td { white-space: normal; vertical-align: top; }
-.words td:first-child { white-space: nowrap; }
+.words td:first-child, .words .soft { white-space: nowrap; }
 tr.loose td { color: var(--soft); }
 td.bad { color: var(--bad); font-weight: 600; }
 .charts { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(30rem, 100%), 1fr)); gap: 1.6rem; }
