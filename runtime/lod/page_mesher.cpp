@@ -27,7 +27,7 @@ constexpr int kLeastRung = kNoRung + 1;  ///< threshold 0: whatever has an error
 constexpr double kGreatestThreshold_m = 1e30;
 /// Where meshes do not fit into the pool the tolerance grows by eighths of an octave.
 constexpr double kCoarsening = 1.0905077326652577;
-constexpr int kMostCoarsening = 400;
+constexpr int kMostCoarsening = 16;  ///< two octaves: about a quarter of the triangles
 /// Of a vertex's byte; 0: not asked about.
 constexpr std::uint8_t kActive = 1, kRejected = 2;
 /// Eyes kept of a tile's last choice; with more views nothing is reused.
@@ -765,18 +765,30 @@ struct PageMesher::Impl {
         gather(views, s.half_curvature, residency, selection);
         counters.tiles = static_cast<std::int64_t>(tiles.size());
         link_tiles();
-        for (int step = 0;; ++step) {
-            for (Drawn& tile : tiles) choose(tile, views, s);
-            agree();
-            if (make_meshes()) break;
-            assert(step < kMostCoarsening);
-            selection.budget_limited = true;
+        const double asked_px = s.tau_px;
+        bool fits = choose_and_make(views, s);
+        for (int step = 0; !fits && step < kMostCoarsening; ++step) {
             s.tau_px = std::max(s.tau_px, 1.0 / 1024) * kCoarsening;
+            fits = choose_and_make(views, s);
         }
+        if (!fits) {
+            // Eyes in the balls of high peaks want all vertices at any tolerance. Patterns need no pool and keep what
+            // was asked; the selection says already how many triangles they are and how far off.
+            selection.tau_effective_px = asked_px;
+            counters.triangles = selection.triangles;
+            return;
+        }
+        selection.budget_limited = selection.budget_limited || s.tau_px > asked_px;
         hand_over(selection);
         selection.tau_effective_px = s.tau_px;
         selection.max_bound_px = std::max(selection.max_bound_px, lod.promise_px(s.tau_px));
         selection.mean_bound_px = std::max(selection.mean_bound_px, lod.promise_px(s.tau_px));
+    }
+
+    bool choose_and_make(std::span<const Camera> views, const MeshSettings& s) {
+        for (Drawn& tile : tiles) choose(tile, views, s);
+        agree();
+        return make_meshes();
     }
 };
 

@@ -47,7 +47,8 @@ public:
     void put(std::int32_t slot, std::span<const SlotVertex> vertices, std::span<const VertexCost> costs);
 
     /// Chooses and makes the meshes of a selection that was made without morphing at kCutShare of the tolerance, and
-    /// writes them and what is promised into it.
+    /// writes them and what is promised into it. Where they do not fit into the pool the tolerance grows by up to two
+    /// octaves; where that does not help either, the selection is left to be drawn by patterns.
     void mesh(std::span<const Camera> views, const MeshSettings& settings, const Residency& residency,
               Selection& selection);
 

@@ -135,7 +135,8 @@ protected:
         LodSettings lod;
         lod.method = GetParam();
         const bool meshed = lod.method != LodMethod::geomip;
-        PageMesher mesher(d, meshed ? lod : LodSettings{LodMethod::rsg}, 4 * static_cast<std::int64_t>(chain.tiles()));
+        PageMesher mesher(d, meshed ? lod : LodSettings{LodMethod::rsg},
+                          32 * static_cast<std::int64_t>(chain.tiles()));  // room for all
         const PageMeasure measure(kTileCellsLog2, lod.metric);
         std::vector<SlotVertex> vertices(slot_vertex_count(kTileCellsLog2));
         std::vector<VertexCost> costs(vertices.size());

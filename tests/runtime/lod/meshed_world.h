@@ -16,9 +16,9 @@ namespace scree::test {
 
 class MeshedWorld {
 public:
-    /// All tiles are resident.
-    MeshedWorld(const TerrainShape& shape, HeightFunction height, const LodSettings& lod,
-                PresenceFunction present = {});
+    /// All tiles are resident. `pool_tiles`: so many whole tiles' triangles have room; 0: all of them.
+    MeshedWorld(const TerrainShape& shape, HeightFunction height, const LodSettings& lod, PresenceFunction present = {},
+                std::int64_t pool_tiles = 0);
     MeshedWorld(const MeshedWorld&) = delete;  // its parts point to one another
     MeshedWorld& operator=(const MeshedWorld&) = delete;
 
@@ -40,7 +40,7 @@ public:
     DrawnMesh mesh(std::size_t view = 0) const;
 
     /// What is wrong with the last draw() of a view, or empty: numbers that are none, holes, cracks, what is seen but
-    /// not drawn, a surface further off than promised.
+    /// not drawn, a surface further off than promised. Where the pool is short, than is stated.
     std::string fault(const Camera& camera, std::size_t view, double tau_px, double half_curvature = 0) const;
     /// Greatest distance on the screen between what was drawn and the finest data, at places of the finest lattice, by
     /// C1 of Scree lod: f K delta h / (r_P r_Q). Places nearer than the near plane do not count.
@@ -51,6 +51,7 @@ public:
 private:
     bool is_data(std::int64_t i, std::int64_t j) const;
 
+    bool pool_is_short_;
     SyntheticTerrain terrain_;
     LodSettings lod_;
     FakeResidency residency_;

@@ -233,6 +233,33 @@ TEST_P(PageExtremes, AnEyeBeyondAllSquaresGivesNumbers) {
         }
 }
 
+// A pool too small for what eyes near high peaks want, at any tolerance: drawn whole, as well as asked for or as
+// stated.
+TEST(PagePool, WhereMeshesDoNotFitTheyAreCoarserOrPatterns) {
+    int coarser = 0, patterns = 0, meshes = 0;
+    for (const LodMethod method : {LodMethod::rsg, LodMethod::block_rsg})
+        for (const std::int32_t relief : {300, 4'000'000})
+            for (const std::int64_t tiles : {1, 4, 20}) {
+                MeshedWorld world({}, test::rough_heights(41, relief), settings(method), {}, tiles);
+                for (const Camera& view : eyes_round(world, 60, 800, 600))
+                    for (const double tau : {0.0, 1.0, 1e3}) {
+                        const Selection& s = world.draw(view, tau);
+                        EXPECT_EQ(world.fault(view, 0, tau), "") << "tau " << tau;
+                        ASSERT_LE(s.tau_effective_px, std::max(tau, 1.0 / 1024) * 4 * (1 + 1e-9));
+                        if (s.draws[0].empty()) continue;
+                        const bool by_meshes = s.draws[0][0].mesh.count > 0;
+                        for (const DrawItem& item : s.draws[0]) ASSERT_EQ(item.mesh.count > 0, by_meshes);
+                        ++(!by_meshes ? patterns : s.budget_limited ? coarser : meshes);
+                        if (!by_meshes) {
+                            EXPECT_LE(s.max_bound_px, tau * (1 + 1e-12));
+                        }
+                    }
+            }
+    EXPECT_GT(coarser, 0);
+    EXPECT_GT(patterns, 5);
+    EXPECT_GT(meshes, 5);
+}
+
 // --- reuse -----------------------------------------------------------------------------------------------------------
 
 Camera over(const MeshedWorld& world, double i, double j, double z, double look_i, double look_j, double fov = 50,

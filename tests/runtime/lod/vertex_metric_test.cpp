@@ -101,6 +101,17 @@ TYPED_TEST(VertexMetric, AToleranceOfAThousandPixelsKeepsOnlyMountains) {
     EXPECT_TRUE(guaranteed_selects(this->real(kFocal * 911), this->real(0), this->real(0), this->real(1e3), s));
 }
 
+// 12: a strip that twists by 160 m between exact sides has to be split from any distance below f K 160.
+TYPED_TEST(VertexMetric, AnErrorOf160MetresIsSplitFrom222Kilometres) {
+    const double error_px = kFocal * 1.26495 * 160;
+    for (const double floor : kFloors) {
+        EXPECT_TRUE(guaranteed_selects(this->real(error_px), this->real(0), this->real(floor), this->real(1),
+                                       sight<TypeParam>(222.4e3, 0)));
+        EXPECT_FALSE(guaranteed_selects(this->real(error_px), this->real(0), this->real(floor), this->real(1),
+                                        sight<TypeParam>(222.5e3, 0)));
+    }
+}
+
 // 8
 TYPED_TEST(VertexMetric, TheBallsOfTheListHaveTheirValues) {
     const double level =
