@@ -1,0 +1,62 @@
+// A strip one cell wide between two blocks, zipped from the vertices selected on its two sides (UC; Scree lod, C9), and
+// how far it is from the same strip with all vertices.
+#pragma once
+
+#include <cmath>
+#include <span>
+#include <vector>
+
+namespace scree {
+
+/// Base on one side, from `low` to `high` along the strip, apex on the other.
+struct StripTriangle {
+    bool base_on_a = true;
+    int low = 0, high = 0, apex = 0;
+};
+
+/// Both increasing, with the same first and last.
+inline std::vector<StripTriangle> zip_strip(std::span<const int> a, std::span<const int> b) {
+    std::vector<StripTriangle> triangles;
+    std::size_t i = 0, j = 0;
+    while (i + 1 < a.size() || j + 1 < b.size())
+        if (j + 1 == b.size() || (i + 1 < a.size() && a[i] + a[i + 1] <= b[j] + b[j + 1])) {
+            triangles.push_back({true, a[i], a[i + 1], b[j]});
+            ++i;
+        } else {
+            triangles.push_back({false, b[j], b[j + 1], a[i]});
+            ++j;
+        }
+    return triangles;
+}
+
+/// Height of the strip with all vertices, t of the way from side A to side B, y cells along it.
+inline double whole_strip_height(std::span<const double> a, std::span<const double> b, double t, double y) {
+    const auto j = std::min(static_cast<std::size_t>(y), a.size() - 2);
+    const double u = y - static_cast<double>(j);
+    if (u <= 1 - t) return a[j] + u * (a[j + 1] - a[j]) + t * (b[j] - a[j]);
+    return b[j + 1] + (1 - t) * (a[j + 1] - b[j + 1]) + (1 - u) * (b[j] - b[j + 1]);
+}
+
+/// visit(t, y, drawn height, whole height) at places inside every triangle: eighths of the width, quarters of a cell.
+template <class Visit>
+void sample_strip(std::span<const double> a, std::span<const double> b, std::span<const StripTriangle> triangles,
+                  const Visit& visit) {
+    for (const StripTriangle& triangle : triangles) {
+        const std::span<const double> base = triangle.base_on_a ? a : b, other = triangle.base_on_a ? b : a;
+        for (int eighth = 1; eighth < 8; ++eighth) {
+            const double s = eighth / 8.0;  // from the base to the apex
+            const double from = triangle.low + s * (triangle.apex - triangle.low);
+            const double to = triangle.high + s * (triangle.apex - triangle.high);
+            for (double y = std::ceil(4 * from) / 4; y <= to; y += 0.25) {
+                const double share = to > from ? (y - from) / (to - from) : 0;
+                const double along = base[static_cast<std::size_t>(triangle.low)] * (1 - share) +
+                                     base[static_cast<std::size_t>(triangle.high)] * share;
+                const double drawn = along * (1 - s) + other[static_cast<std::size_t>(triangle.apex)] * s;
+                const double t = triangle.base_on_a ? s : 1 - s;
+                visit(t, y, drawn, whole_strip_height(a, b, t, y));
+            }
+        }
+    }
+}
+
+}  // namespace scree
