@@ -93,7 +93,7 @@ Figure claim_c14_connectivity(const ClaimBench& bench) {
         }
         for (const bool with : {false, true}) {
             const auto delta = with ? GeomipMetric::Delta::bands : GeomipMetric::Delta::error;
-            const PixelErrors errors = just_past(world, random, {delta, true, false, 8}, bench.amount(2000, 300));
+            const PixelErrors errors = just_past(world, random, {delta, true, false, 8}, bench.amount(6000, 2500));
             past.rows.push_back(
                 {static_cast<double>(1 << n), std::string(with ? "yes" : "no"), errors.mean(), errors.max()});
             double& over = with ? counted_past : uncounted_past;
