@@ -1,6 +1,6 @@
 // Every claim by a twentieth of its samples, on made-up ground: the verdicts, and the numbers that theory gives
 // exactly.
-#include "experiments/claims.h"
+#include "experiments/claims/claims.h"
 
 #include <gtest/gtest.h>
 
@@ -128,10 +128,14 @@ TEST(ClaimGround, IsTheSameOnEveryMachine) {
 
 // The paper's own region: what Scree lod, sections 1 to 4, has of it.
 TEST(ClaimFigures, OfTheTaipeiWindowAreThoseOfTheMathematics) {
-    const char* store = std::getenv("SCREE_TAIPEI_STORE");
-    if (store == nullptr)
-        GTEST_SKIP() << "SCREE_TAIPEI_STORE is not set: a store of the Taipei window, 660 x 660, 30 m";
-    const auto terrain = terrain_of_store(store, kLeastTerrainSide);
+    const char* data = std::getenv("SCREE_DATA");
+    const std::string dem = data == nullptr ? "" : std::string(data) + "/taipei/window_660_30m.tif";
+    if (!std::filesystem::exists(dem))
+        GTEST_SKIP() << "needs taipei/window_660_30m.tif in the folder that $SCREE_DATA names";
+    const test::TemporaryFolder folder;
+    const test::ProgramRun built = test::scree({"build", dem, "-o", folder.file("s.scree")});
+    ASSERT_EQ(built.exit_code, 0) << test::describe(built);
+    const auto terrain = terrain_of_store(folder.file("s.scree"), kLeastTerrainSide);
     ASSERT_TRUE(terrain.ok()) << terrain.error().message;
     ASSERT_EQ(terrain->columns, 660);
     const ClaimBench taipei{*terrain, 1, true};

@@ -1,4 +1,4 @@
-#include "experiments/strip.h"
+#include "experiments/claims/strip.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 namespace scree {
 namespace {
 
-std::vector<int> random_side(test::Random& random, int cells) {
-    std::vector<int> side{0};
+std::vector<std::int32_t> random_side(test::Random& random, int cells) {
+    std::vector<std::int32_t> side{0};
     for (int k = 1; k < cells; ++k)
         if (test::uniform(random, 0, 2) == 0) side.push_back(k);
     side.push_back(cells);
@@ -35,7 +35,7 @@ TEST(Strip, WithAllItsVerticesIsTheWholeOne) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());
     std::vector<double> a, b;
-    std::vector<int> all;
+    std::vector<std::int32_t> all;
     for (int k = 0; k <= 32; ++k) {
         a.push_back(test::uniform(random, 0, 1000));
         b.push_back(test::uniform(random, 0, 1000));

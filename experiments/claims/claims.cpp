@@ -1,4 +1,4 @@
-#include "experiments/claims.h"
+#include "experiments/claims/claims.h"
 
 namespace scree {
 

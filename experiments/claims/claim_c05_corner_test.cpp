@@ -1,8 +1,8 @@
 // C5: the block test at the corners does not imply the vertex test; T1 (Scree lod, 1.2) does.
 #include <fmt/format.h>
 
-#include "experiments/claims.h"
-#include "experiments/eye_rings.h"
+#include "experiments/claims/claims.h"
+#include "experiments/claims/eye_rings.h"
 #include "experiments/plot.h"
 #include "runtime/lod/reuse.h"
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "common/report.h"
-#include "experiments/claims.h"
+#include "experiments/claims/claims.h"
 
 namespace {
 

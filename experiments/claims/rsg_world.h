@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "experiments/sampling.h"
-#include "experiments/terrain.h"
+#include "experiments/claims/sampling.h"
+#include "experiments/claims/terrain.h"
 #include "runtime/lod/block_selection.h"
 
 namespace scree {

@@ -1,9 +1,9 @@
 // C3: from |g1 - g0| < (s / tau) g0 follows only g1 > g0 (1 - s/tau), so an error of up to tau / (1 - s/tau).
 #include <fmt/format.h>
 
-#include "experiments/claims.h"
+#include "experiments/claims/claims.h"
+#include "experiments/claims/sampling.h"
 #include "experiments/plot.h"
-#include "experiments/sampling.h"
 
 namespace scree {
 namespace {

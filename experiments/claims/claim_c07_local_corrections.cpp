@@ -1,9 +1,9 @@
 // C7: delta(v) is one level's correction; vertices dropped above one another add up. The saturated metric keeps tau.
 #include <fmt/format.h>
 
-#include "experiments/claims.h"
+#include "experiments/claims/claims.h"
+#include "experiments/claims/rsg_world.h"
 #include "experiments/plot.h"
-#include "experiments/rsg_world.h"
 
 namespace scree {
 namespace {

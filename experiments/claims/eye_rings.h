@@ -4,7 +4,7 @@
 #include <array>
 #include <string>
 
-#include "experiments/rsg_world.h"
+#include "experiments/claims/rsg_world.h"
 
 namespace scree {
 

@@ -1,9 +1,9 @@
 // C2: E = f |delta| |(u x P)_xy| / (Z_P Z_Q), u = up, P the point in camera axes; |u x P| = h, Z >= r / sqrt(K).
 #include <fmt/format.h>
 
-#include "experiments/claims.h"
+#include "experiments/claims/claims.h"
+#include "experiments/claims/sampling.h"
 #include "experiments/plot.h"
-#include "experiments/sampling.h"
 
 namespace scree {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "experiments/geomip_world.h"
+#include "experiments/claims/geomip_world.h"
 
 namespace scree {
 

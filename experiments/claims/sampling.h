@@ -11,7 +11,7 @@
 
 #include <glm/glm.hpp>
 
-#include "experiments/terrain.h"
+#include "experiments/claims/terrain.h"
 #include "runtime/view/camera.h"
 #include "runtime/view/frustum.h"
 

@@ -4,10 +4,10 @@
 
 #include "common/mesh/drawn_surface.h"
 #include "common/mesh/tile_patterns.h"
-#include "experiments/claims.h"
-#include "experiments/geomip_world.h"
+#include "experiments/claims/claims.h"
+#include "experiments/claims/geomip_world.h"
+#include "experiments/claims/strip.h"
 #include "experiments/plot.h"
-#include "experiments/strip.h"
 
 namespace scree {
 namespace {
@@ -38,7 +38,7 @@ double whole_cells(const Band& band, double t, double y) {
 
 /// Greatest jump, quanta, where the band is zipped anew once its outer vertices of odd number lie on their chords.
 double restitched_jump(Band band) {
-    std::vector<int> outer, inner;
+    std::vector<std::int32_t> outer, inner;
     for (std::size_t k = 0; k < band.outer.size(); ++k) {
         if (k % 2 == 0)
             outer.push_back(static_cast<int>(k));

@@ -1,10 +1,14 @@
-// A strip one cell wide between two blocks, zipped from the vertices selected on its two sides (UC; Scree lod, C9), and
-// how far it is from the same strip with all vertices.
+// How far a strip one cell wide between two blocks (runtime/lod/dike.h) is from the same strip with all its vertices,
+// and what a row of cells is from one that is zipped.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <span>
 #include <vector>
+
+#include "runtime/lod/dike.h"
 
 namespace scree {
 
@@ -14,18 +18,14 @@ struct StripTriangle {
     int low = 0, high = 0, apex = 0;
 };
 
-/// Both increasing, with the same first and last.
-inline std::vector<StripTriangle> zip_strip(std::span<const int> a, std::span<const int> b) {
+/// Of the selected samples of both sides: see walk_zipper.
+inline std::vector<StripTriangle> zip_strip(std::span<const std::int32_t> a, std::span<const std::int32_t> b) {
     std::vector<StripTriangle> triangles;
-    std::size_t i = 0, j = 0;
-    while (i + 1 < a.size() || j + 1 < b.size())
-        if (j + 1 == b.size() || (i + 1 < a.size() && a[i] + a[i + 1] <= b[j] + b[j + 1])) {
-            triangles.push_back({true, a[i], a[i + 1], b[j]});
-            ++i;
-        } else {
-            triangles.push_back({false, b[j], b[j + 1], a[i]});
-            ++j;
-        }
+    walk_zipper(a, b, [&](bool on_b, std::int32_t base, std::int32_t apex) {
+        const auto side = on_b ? b : a, other = on_b ? a : b;
+        const auto k = static_cast<std::size_t>(base);
+        triangles.push_back({!on_b, side[k], side[k + 1], other[static_cast<std::size_t>(apex)]});
+    });
     return triangles;
 }
 

@@ -1,4 +1,4 @@
-#include "experiments/rsg_world.h"
+#include "experiments/claims/rsg_world.h"
 
 #include <limits>
 

@@ -1,8 +1,8 @@
 // C12: the error against level n - 1 is not the error against level 0.
 #include <fmt/format.h>
 
-#include "experiments/claims.h"
-#include "experiments/geomip_flight.h"
+#include "experiments/claims/claims.h"
+#include "experiments/claims/geomip_flight.h"
 #include "experiments/plot.h"
 
 namespace scree {

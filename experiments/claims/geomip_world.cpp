@@ -1,4 +1,4 @@
-#include "experiments/geomip_world.h"
+#include "experiments/claims/geomip_world.h"
 
 #include <algorithm>
 #include <cmath>

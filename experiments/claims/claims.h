@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "experiments/figure.h"
-#include "experiments/terrain.h"
+#include "experiments/claims/figure.h"
+#include "experiments/claims/terrain.h"
 
 namespace scree {
 

@@ -1,8 +1,8 @@
 // C13: the distance to a block's centre passes the distance to its nearest point, without bound near the block.
 #include <fmt/format.h>
 
-#include "experiments/claims.h"
-#include "experiments/geomip_flight.h"
+#include "experiments/claims/claims.h"
+#include "experiments/claims/geomip_flight.h"
 #include "experiments/plot.h"
 
 namespace scree {

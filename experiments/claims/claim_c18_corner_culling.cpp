@@ -1,9 +1,9 @@
 // C18: a tile may be in view though none of its corners is.
 #include <fmt/format.h>
 
-#include "experiments/claims.h"
+#include "experiments/claims/claims.h"
+#include "experiments/claims/sampling.h"
 #include "experiments/plot.h"
-#include "experiments/sampling.h"
 
 namespace scree {
 namespace {

@@ -1,4 +1,4 @@
-#include "experiments/terrain.h"
+#include "experiments/claims/terrain.h"
 
 #include <fmt/format.h>
 

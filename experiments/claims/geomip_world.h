@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "experiments/sampling.h"
-#include "experiments/terrain.h"
+#include "experiments/claims/sampling.h"
+#include "experiments/claims/terrain.h"
 
 namespace scree {
 

@@ -2,8 +2,8 @@
 #include <fmt/format.h>
 
 #include "common/mesh/morphed_vertex.h"
-#include "experiments/claims.h"
-#include "experiments/geomip_flight.h"
+#include "experiments/claims/claims.h"
+#include "experiments/claims/geomip_flight.h"
 #include "experiments/plot.h"
 
 namespace scree {

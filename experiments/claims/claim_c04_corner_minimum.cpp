@@ -4,8 +4,8 @@
 
 #include <limits>
 
-#include "experiments/claims.h"
-#include "experiments/eye_rings.h"
+#include "experiments/claims/claims.h"
+#include "experiments/claims/eye_rings.h"
 #include "experiments/plot.h"
 
 namespace scree {
