@@ -69,7 +69,7 @@ TEST(DeBoer, ALoneTileHasTheLastLevelWhoseDistanceToTheCentreIsPassed) {
             ++drawn_at[static_cast<std::size_t>(expected)];
         }
     }
-    for (const int count : drawn_at) EXPECT_GT(count, 20);
+    for (const int count : drawn_at) EXPECT_GT(count, 5);
 }
 
 TEST(DeBoer, MorphsLinearlyBetweenTheDistancesOfTwoLevels) {
@@ -99,15 +99,18 @@ TEST(DeBoer, APageSplitsByWhatItsChildrensCertifiedErrorsGrow) {
     test::Random random(test::seed());
     int split = 0, whole = 0;
     for (int world = 0; world < 8; ++world) {
-        const test::SyntheticTerrain terrain(blocks_of_33(128), test::rough_heights(random(), 1 << (3 + world)));
-        ASSERT_EQ(terrain.lattice().deepest_level, 2);
+        // Of a leaf's own samples nothing is missed: its error before the first stride counts edges alone.
+        const bool leaves = world % 2 == 1;
+        const test::SyntheticTerrain terrain(blocks_of_33(leaves ? 64 : 128),
+                                             test::rough_heights(random(), 8 << world));
+        ASSERT_EQ(terrain.lattice().deepest_level, leaves ? 1 : 2);
         test::FakeResidency residency(terrain);
         residency.add_all();
         residency.keep_corrections();
         Selector selector(terrain.dataset());
         double growth_n = 0;
         for (const HeightBounds& child : terrain.tile({0, 0, 0})->header.children)
-            growth_n = std::max(growth_n, static_cast<double>(child.error_n[1] - child.error_n[0]));
+            growth_n = std::max(growth_n, static_cast<double>(child.error_n[1] - (leaves ? 0.0f : child.error_n[0])));
         for (int k = 0; k < 200; ++k) {
             const Camera camera = test::random_camera(random, terrain);
             const double tau_px = std::exp(test::uniform_real(random, -3, 6));
