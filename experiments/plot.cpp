@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kWidth_px = 760, kHeight_px = 440;
 constexpr double kLeft_px = 74, kTop_px = 62, kBottom_px = 60, kRight_px = 18;
+constexpr double kLine_px = 16;
 constexpr double kLegendKey_px = 26;  // line and marker before a name
 constexpr double kLetter_px = 6.4;    // mean width at 12 px of the usual sans serif faces
 constexpr std::size_t kColours = 8;
@@ -21,11 +22,13 @@ constexpr std::size_t kColours = 8;
 constexpr std::string_view kStyle =
     ".p{fill:#ffffff}.t{fill:#1c2024;font-family:system-ui,sans-serif;font-size:12px}.h{font-size:15px;font-weight:600}"
     ".u{fill:#5b6470}.g{stroke:#d9dde2;stroke-width:1}.a{stroke:#5b6470;stroke-width:1}"
+    ".n{paint-order:stroke;stroke:#ffffff;stroke-width:3px;stroke-linejoin:round}"
     ".l{stroke:#5b6470;stroke-width:1.2;stroke-dasharray:2 3}"
     ".s{fill:none;stroke-width:1.8;stroke-linejoin:round}.d{stroke-dasharray:6 4}"
     ".c0{color:#0b62a8}.c1{color:#c2410c}.c2{color:#15803d}.c3{color:#7c3aed}.c4{color:#a16207}.c5{color:#be185d}"
     ".c6{color:#0f766e}.c7{color:#525252}"
-    "@media(prefers-color-scheme:dark){.p{fill:#14171a}.t{fill:#e6e9ec}.u{fill:#9aa4af}.g{stroke:#30363d}"
+    "@media(prefers-color-scheme:dark){.p{fill:#14171a}.t{fill:#e6e9ec}.u{fill:#9aa4af}.n{stroke:#14171a}.g{stroke:#"
+    "30363d}"
     ".a,.l{stroke:#9aa4af}.c0{color:#6cb6ff}.c1{color:#ff9466}.c2{color:#5fd38d}.c3{color:#b79cff}.c4{color:#e3bf5a}"
     ".c5{color:#ff8fc0}.c6{color:#5ed1c5}.c7{color:#b5b5b5}}";
 
@@ -63,6 +66,22 @@ std::string number(double value) {
 double text_px(std::string_view text) {
     const auto letters = std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xC0) != 0x80; });
     return kLetter_px * static_cast<double>(letters);
+}
+
+/// Lines of at most so many pixels; a longer word has one to itself.
+std::vector<std::string> wrapped(const std::string& text, double width_px) {
+    std::vector<std::string> lines;
+    for (std::size_t at = 0; at < text.size();) {
+        std::size_t end = text.find(' ', at);
+        for (std::size_t next = end; next != std::string::npos;) {
+            next = text.find(' ', end + 1);
+            if (text_px(text.substr(at, next - at)) > width_px) break;
+            end = next;
+        }
+        lines.push_back(text.substr(at, end - at));
+        at = end == std::string::npos ? text.size() : end + 1;
+    }
+    return lines;
 }
 
 /// One axis laid out: the values at its ends, in log10 where it is logarithmic, and where its ticks stand.
@@ -155,13 +174,17 @@ public:
             "<rect class=\"p\" width=\"{0:.0f}\" height=\"{1:.0f}\"/>\n",
             kWidth_px, kHeight_px, escaped(title), escaped(subtitle), kStyle);
         text(kLeft_px, 26, title, "t h", "start");
-        text(kLeft_px, 45, subtitle, "t u", "start");
+        for (const std::string& line : wrapped(subtitle, kWidth_px - kLeft_px - kRight_px)) {
+            text(kLeft_px, top_px_ - 17, line, "t u", "start");
+            top_px_ += kLine_px;
+        }
+        if (!subtitle.empty()) top_px_ -= kLine_px;
         draw_legend(legend);
     }
 
     double left() const { return kLeft_px; }
     double right() const { return right_px_; }
-    double top() const { return kTop_px; }
+    double top() const { return top_px_; }
     double bottom() const { return kHeight_px - kBottom_px; }
     double x(double share) const { return left() + share * (right() - left()); }
     double y(double share) const { return bottom() - share * (bottom() - top()); }
@@ -201,7 +224,7 @@ public:
             if (!scale.can_show(level.y)) continue;
             const double at = y(scale.share(level.y));
             line(left(), at, right(), at, "l");
-            text(right() - 4, at - 4, level.name, "t u", "end");
+            text(right() - 4, at - 4, level.name, "t u n", "end");
         }
     }
     void marker(std::size_t shape, std::size_t colour, double at_x, double at_y) {
@@ -231,7 +254,7 @@ public:
 
 private:
     void draw_legend(const std::vector<LegendEntry>& legend) {
-        double at_y = kTop_px + 8;
+        double at_y = top_px_ + 8;
         const double at_x = right_px_ + 14;
         for (std::size_t k = 0; k < legend.size(); ++k) {
             const LegendEntry& entry = legend[k];
@@ -244,7 +267,7 @@ private:
     }
 
     std::string out_;
-    double right_px_ = 0;
+    double right_px_ = 0, top_px_ = kTop_px;
 };
 
 void draw(Sheet& sheet, const PlotSeries& series, std::size_t colour, const Scale& x, const Scale& y) {

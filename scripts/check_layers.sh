@@ -47,6 +47,7 @@ forbid common "$opengl|$window|$images|$proj" "common/ sees no OpenGL, no window
 forbid "common/mesh common/store" 'common/query/' "common/mesh and common/store lie below common/query:"
 forbid tools 'runtime/' "tools/ and runtime/ never meet:"
 forbid runtime 'tools/' "runtime/ and tools/ never meet:"
+forbid "common tools runtime" 'experiments/' "experiments/ is included by nothing but its tests:"
 forbid "$below_render" 'runtime/render/|runtime/app/' "runtime/view, paging and lod lie below render and app:"
 forbid "$below_render" "$window" "runtime/view, paging and lod know no window:"
 forbid runtime/render 'runtime/app/' "runtime/render lies below app:"

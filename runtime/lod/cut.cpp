@@ -142,26 +142,25 @@ void Cut::judge(CutNode& node, double parent_error_m) const {
     judge_texture(node);
 }
 
-// De Boer: the last level whose distance is passed, and the linear morph between two. Where errors do not grow from
-// level to level the greatest so far counts, and two levels of one error are left at one distance.
+// De Boer: the last level whose distance is passed, whatever the levels before it are like; then the linear morph
+// towards the next. Steps need not grow from level to level: where they do not, levels hand over in a jump.
 void Cut::judge_by_corrections(CutNode& node) const {
     const int finest = minimum_exponent(node);
     const double allowed_m = settings_.tau_px * node.metres_per_px;
-    double finer_m = node.finest_error_m = correction_m(node, 0);
-    if (finer_m > allowed_m) {
-        node.level = level_of(finest);
-        node.wants_geometry = !node.leaf;
-        return;
-    }
-    for (int geomip = 1; geomip < lattice_.tile_cells_log2; ++geomip) {
-        const double coarser_m = std::max(finer_m, correction_m(node, geomip));
-        if (coarser_m > allowed_m) {
-            const double share = (allowed_m - finer_m) / (coarser_m - finer_m);
-            node.level = level_of(finest + geomip - 1) + std::min(level_of_share(share), kOneLevel - 1);
+    node.finest_error_m = correction_m(node, 0);
+    double coarser_m = kInfinity;
+    for (int geomip = lattice_.tile_cells_log2 - 1; geomip >= 0; --geomip) {
+        const double step_m = geomip > 0 ? correction_m(node, geomip) : node.finest_error_m;
+        if (step_m <= allowed_m) {
+            // The coarsest stride has none to morph to.
+            const double share = std::isinf(coarser_m) ? 0 : (allowed_m - step_m) / (coarser_m - step_m);
+            node.level = level_of(finest + geomip) + std::min(level_of_share(share), kOneLevel - 1);
             return;
         }
-        finer_m = coarser_m;
+        coarser_m = step_m;
     }
+    node.level = level_of(finest);
+    node.wants_geometry = !node.leaf;
 }
 
 // What a stride misses of the next finer one. Of a resident tile, but for its densest mesh, its samples say. What its

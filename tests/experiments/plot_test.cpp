@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -102,6 +103,23 @@ TEST(PlotTest, NamesAreEscapedAndListed) {
     EXPECT_TRUE(has_text(svg, "a &lt; b &amp; &quot;c&quot;"));
     EXPECT_TRUE(has_text(svg, "x &gt; y"));
     EXPECT_TRUE(has_text(svg, "tau"));
+}
+
+TEST(PlotTest, ALongSubtitleIsWrappedWithoutLosingAWord) {
+    LineChart chart = chart_of({{0, 1}, {1, 2}});
+    for (int k = 0; k < 60; ++k) chart.subtitle += "word" + std::to_string(k) + (k < 59 ? " " : "");
+    const std::string svg = to_svg(chart);
+    std::size_t lines = 0;
+    int next = 0;
+    for (std::size_t at = svg.find("class=\"t u\""); at != std::string::npos; at = svg.find("class=\"t u\"", at + 1)) {
+        const std::size_t from = svg.find('>', at) + 1, to = svg.find('<', from);
+        EXPECT_LT(to - from, 115u);
+        std::istringstream words(svg.substr(from, to - from));
+        for (std::string word; words >> word;) EXPECT_EQ(word, "word" + std::to_string(next++));
+        ++lines;
+    }
+    EXPECT_EQ(next, 60);
+    EXPECT_GT(lines, 2u);
 }
 
 TEST(PlotTest, BarsAreAsHighAsTheirValues) {

@@ -63,13 +63,13 @@ TEST(DeBoer, ALoneTileHasTheLastLevelWhoseDistanceToTheCentreIsPassed) {
             if (s.draws[0].empty()) continue;
             ASSERT_EQ(s.draws[0].size(), 1u);
             const double allowed = allowed_m(terrain, {0, 0, 0}, camera, tau_px);
-            int expected = 0;
-            while (expected < 4 && level_to_level_m(terrain, {0, 0, 0}, expected + 1) <= allowed) ++expected;
+            int expected = 4;
+            while (expected > 0 && level_to_level_m(terrain, {0, 0, 0}, expected) > allowed) --expected;
             ASSERT_EQ(s.draws[0][0].geomip, expected);
             ++drawn_at[static_cast<std::size_t>(expected)];
         }
     }
-    for (const int count : drawn_at) EXPECT_GT(count, 20);
+    for (const int count : drawn_at) EXPECT_GT(count, 5);
 }
 
 TEST(DeBoer, MorphsLinearlyBetweenTheDistancesOfTwoLevels) {
@@ -82,6 +82,7 @@ TEST(DeBoer, MorphsLinearlyBetweenTheDistancesOfTwoLevels) {
     const Lattice& l = terrain.lattice();
     const double first = level_to_level_m(terrain, {0, 0, 0}, 1), second = level_to_level_m(terrain, {0, 0, 0}, 2);
     ASSERT_GT(second, first);
+    for (int geomip = 3; geomip < 5; ++geomip) ASSERT_GT(level_to_level_m(terrain, {0, 0, 0}, geomip), second);
     auto camera = look_at({l.x_m(16), l.y_m(16) - 3000, 500}, {l.x_m(16), l.y_m(16), 0}, 40, 800, 800);
     ASSERT_TRUE(camera.ok());
     for (const double share : {0.125, 0.5, 0.875}) {
@@ -98,22 +99,28 @@ TEST(DeBoer, APageSplitsByWhatItsChildrensCertifiedErrorsGrow) {
     test::Random random(test::seed());
     int split = 0, whole = 0;
     for (int world = 0; world < 8; ++world) {
-        const test::SyntheticTerrain terrain(blocks_of_33(128), test::rough_heights(random(), 1 << (3 + world)));
-        ASSERT_EQ(terrain.lattice().deepest_level, 2);
+        // Of a leaf's own samples nothing is missed: its error before the first stride counts edges alone.
+        const bool leaves = world % 2 == 1;
+        const test::SyntheticTerrain terrain(blocks_of_33(leaves ? 64 : 128),
+                                             test::rough_heights(random(), 8 << world));
+        ASSERT_EQ(terrain.lattice().deepest_level, leaves ? 1 : 2);
         test::FakeResidency residency(terrain);
         residency.add_all();
         residency.keep_corrections();
         Selector selector(terrain.dataset());
         double growth_n = 0;
         for (const HeightBounds& child : terrain.tile({0, 0, 0})->header.children)
-            growth_n = std::max(growth_n, static_cast<double>(child.error_n[1] - child.error_n[0]));
+            growth_n = std::max(growth_n, static_cast<double>(child.error_n[1] - (leaves ? 0.0f : child.error_n[0])));
         for (int k = 0; k < 200; ++k) {
             const Camera camera = test::random_camera(random, terrain);
             const double tau_px = std::exp(test::uniform_real(random, -3, 6));
             const Selection& s = selector.select({&camera, 1}, deboer(tau_px), residency);
             if (s.draws[0].empty()) continue;
-            const bool expected =
-                growth_n * terrain.dataset().height_quantum_m > allowed_m(terrain, {0, 0, 0}, camera, tau_px);
+            const double allowed = allowed_m(terrain, {0, 0, 0}, camera, tau_px);
+            bool expected = growth_n * terrain.dataset().height_quantum_m > allowed;
+            // A coarser stride of its own may be good enough by the paper's measure, though that one is not.
+            for (int geomip = 1; geomip < 5; ++geomip)
+                expected = expected && level_to_level_m(terrain, {0, 0, 0}, geomip) > allowed;
             ASSERT_EQ(s.draws[0][0].tile.level > 0, expected);
             ++(expected ? split : whole);
         }
