@@ -35,7 +35,8 @@ done
 
 work=$(mktemp -d)
 trap 'rm -rf -- "$work"' EXIT
-mkdir -p -- "$out"
+mkdir -p -- "$out" "$work/parts"
+parts=10 # numbers the parts of the page, in order
 out=$(cd -- "$out" && pwd -P)
 
 # ---- stores ----
@@ -58,21 +59,37 @@ tables() {
     echo "scree_paper_tables: $2" >&2
     "$programs/scree_paper_tables" --store "$work/$1.scree" --out "$out" --name "$1" --title "$2" \
         ${quick[@]+"${quick[@]}"} 2>"$work/$1.log" || { cat "$work/$1.log" >&2; exit 1; }
+    mv -- "$out/paper_$1.md" "$work/parts/$parts-paper_$1.md"
+    parts=$((parts + 1))
 }
 [[ -z $taipei ]] || tables taipei "Taipei: a window of the papers' region"
 tables synth "A made-up landscape"
 
 # ---- claims of the papers that fail ----
 
+# claims_part: the verdicts, and the charts that $out/claims holds.
+claims_part() {
+    printf '## Claims\n\n```\n'
+    cat -- "$work/claims.txt"
+    printf '```\n\n'
+    local chart
+    for chart in "$out"/claims/*.svg; do
+        [[ ! -f $chart ]] || printf '![%s](claims/%s)\n' "$(basename -- "$chart" .svg)" "${chart##*/}"
+    done
+}
 if [[ -x $programs/scree_claims ]]; then
     echo scree_claims >&2
-    terrain=(--store "$work/synth.scree")
-    [[ -z $taipei ]] || terrain=(--store "$work/taipei.scree")
-    "$programs/scree_claims" "${terrain[@]}" --out "$out/claims" ${quick[@]+"${quick[@]}"} >"$work/claims.txt" ||
+    terrain=$work/synth.scree
+    [[ -z $taipei ]] || terrain=$work/taipei.scree
+    "$programs/scree_claims" --store "$terrain" --out "$out/claims" ${quick[@]+"${quick[@]}"} >"$work/claims.txt" ||
         echo "scree_claims: a verdict is not as theory has it" >&2
+    claims_part >"$work/parts/$parts-claims.md"
+    parts=$((parts + 1))
 fi
 
-# ---- Ke et al. and de Boer: their programs go here, each with its part of the page in $out/NAME.md ----
+# ---- Ke et al. and de Boer ----
+# Their programs go here, each run where it has been built: tables and charts into $out, its part of the page into
+# $work/parts/$parts-NAME.md.
 
 # ---- the page ----
 
@@ -91,28 +108,7 @@ error, by the paper's own measure, of a vertex that is not selected. **Greatest 
 over all vertices in view, and over the insides of strips. **LOD ms**: culling, reuse tests, selections, meshes and dikes of a frame; the first frame apart.
 END
     printf '\nMachine: %s.\n\n' "$(lscpu | sed -n 's/^Model name: *//p' | head -n 1), one thread"
-    for part in "$out"/paper_taipei.md "$out"/paper_synth.md; do
-        [[ -f $part ]] && cat -- "$part"
-    done
-    claims
-    # Parts of further programs.
-    for part in "$out"/*.md; do
-        case ${part##*/} in README.md | paper_*.md) continue ;; esac
-        cat -- "$part"
-    done
-}
-
-# The claims' verdicts and charts, where they were made.
-claims() {
-    local chart
-    [[ -f $work/claims.txt ]] || return 0
-    printf '## Claims\n\n```\n'
-    cat -- "$work/claims.txt"
-    printf '```\n\n'
-    for chart in "$out"/claims/*.svg; do
-        [[ -f $chart ]] && printf '![%s](claims/%s)\n' "$(basename -- "$chart" .svg)" "${chart##*/}"
-    done
-    return 0
+    cat -- "$work"/parts/*.md
 }
 
 page >"$work/README.md"
