@@ -11,7 +11,7 @@ constexpr double kPi = std::numbers::pi;
 constexpr double kRadiusShare = 0.16;
 constexpr int kSize = 800;
 constexpr double kFov = 40;
-constexpr std::int64_t kNearBy = 10;  ///< samples
+constexpr std::int64_t kNearBy = 4;  ///< samples
 constexpr int kSmoothing = 40;        ///< frames to either side
 
 struct Round {

@@ -30,7 +30,7 @@ Result<void> run(const Options& o) {
     if (!raster) return raster.error();
     paper::TableOptions options;
     options.quick = o.quick;
-    options.frames = o.frames > 1 ? o.frames : o.quick ? 120 : 800;
+    options.frames = o.frames > 1 ? o.frames : o.quick ? 300 : 800;
     std::error_code error;
     std::filesystem::create_directories(o.out, error);
     if (error) return Error{ErrorCode::io, fmt::format("{}: {}", o.out, error.message())};
@@ -68,7 +68,7 @@ int main_of(int argc, char** argv) {
     app.add_option("--out", o.out, "Folder for tables, charts and the page; made when missing")->required();
     app.add_option("--name", o.name, "In file names")->capture_default_str();
     app.add_option("--title", o.title, "For people")->capture_default_str();
-    app.add_option("--frames", o.frames, "Of each flight; 0: 800, or 120 with --quick")->capture_default_str();
+    app.add_option("--frames", o.frames, "Of each flight; 0: 800, or 300 with --quick")->capture_default_str();
     app.add_option("--budget", o.budget, "Ceiling of memory for the raster")->capture_default_str();
     app.add_flag("--quick", o.quick, "Fewer rows and frames, each timed once");
     try {

@@ -26,7 +26,7 @@ Figures measure(BlockWorld& world, const std::vector<Camera>& flight, const Bloc
         const BlockFrame frame = world.select(flight[k], rules);
         if (k % static_cast<std::size_t>(options.judge_every) == 0) {
             judge_frame(world, flight[k], frame, rules.tau_px + rules.s_px, f.truth);
-            judge_selection(world, flight[k], frame, rules, f.selection);
+            if (rules.metric == BlockMetric::uc) judge_selection(world, flight[k], frame, rules, f.selection);
             f.judged_reused += frame.reused;
         }
         if (k == 0) continue;

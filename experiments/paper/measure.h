@@ -15,13 +15,13 @@ struct Figures {
     double lod_ms = 0;        ///< CPU time of a frame's selection, meshes and dikes: the least of the repeats' means
     double reused_share = 0;  ///< of the blocks in view
     double regenerated = 0, meshes_made = 0, strips_made = 0;  ///< a frame
-    SelectionTruth selection;                                  ///< by the paper's test
+    SelectionTruth selection;                                  ///< of UC
     std::int64_t judged_reused = 0;                            ///< blocks reused in judged frames
     BlockTruth truth;
 };
 
 struct MeasureOptions {
-    int judge_every = 2;  ///< frames
+    int judge_every = 4;  ///< frames
     int repeats = 3;      ///< of the timing, without judging between the frames
 };
 

@@ -82,6 +82,11 @@ Result<BlockWorld> BlockWorld::make(const HeightRaster& raster, const BlockWorld
         return Error{ErrorCode::usage,
                      fmt::format("{} x {} samples are less than one block of {} x {}: nothing to show", raster.columns,
                                  raster.rows, stride, stride)};
+    // Vertices are numbered in 32 bits. Of at most 2^30 cells a side: the product fits.
+    if ((raster.columns / stride) * (raster.rows / stride) * stride * stride > std::int64_t{1} << 31)
+        return Error{ErrorCode::usage, fmt::format("{} x {} samples are more than 2^31: too many for separate blocks",
+                                                   raster.columns, raster.rows)};
+    assert(raster.z.size() == static_cast<std::size_t>(raster.columns * raster.rows));
     for (std::size_t k = 0; k < raster.z.size(); ++k)
         if (!std::isfinite(raster.z[k]))
             return Error{ErrorCode::input,

@@ -70,7 +70,8 @@ public:
     static constexpr std::int64_t kBytesPerSample = 8 + 16 + 1 + 26;
 
     /// Crops to whole blocks from the north-west corner: dropped_columns() and dropped_rows() say by how much. Errors:
-    /// ErrorCode::usage where not even one block fits; ErrorCode::input for a height that is no finite number.
+    /// ErrorCode::usage where not even one block fits, and for more than 2^31 samples; ErrorCode::input for a height
+    /// that is no finite number.
     static Result<BlockWorld> make(const HeightRaster& raster, const BlockWorldOptions& options = {});
 
     const BlockFrame& select(const Camera& camera, const BlockRules& rules);

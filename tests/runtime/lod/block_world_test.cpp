@@ -508,6 +508,9 @@ TEST(BlockWorld, OtherSizesAreCroppedToWholeBlocksAndTooSmallOnesRefused) {
     const auto none = BlockWorld::make(raster_of(100, 32, 10, flat));
     ASSERT_FALSE(none.ok());
     EXPECT_EQ(none.error().code, ErrorCode::usage);
+    const auto vast = BlockWorld::make(HeightRaster{66'000, 33'000, 0, 0, 10, {}});
+    ASSERT_FALSE(vast.ok());
+    EXPECT_EQ(vast.error().code, ErrorCode::usage);
     HeightRaster broken = raster_of(33, 33, 10, flat);
     broken.z[40] = std::nan("");
     const auto bad = BlockWorld::make(broken);
