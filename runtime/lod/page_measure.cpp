@@ -1,9 +1,11 @@
 #include "runtime/lod/page_measure.h"
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "common/mesh/geometric_error.h"
+#include "runtime/lod/block_kernels.h"
 #include "runtime/lod/vertex_errors.h"
 
 namespace scree {
@@ -49,7 +51,11 @@ void PageMeasure::measure(const Dataset& dataset, TileId id, const HeightTileHea
         const double spacing_m = l.spacing_m * static_cast<double>(l.step(id.level));
         const std::array<double, 4> base_m = base_errors_m(dataset, header);
         dropped_errors(bisection, z, error);
-        diamond_radii(bisection, z, spacing_m, *std::max_element(base_m.begin(), base_m.end()), radius);
+        const auto [low, high] = std::minmax_element(z.begin(), z.end());
+        const double side_m = spacing_m * bisection.cells(), reach_m = std::hypot(side_m, side_m, *high - *low) / 2;
+        // What the balls are enlarged by for single precision: block_kernels.h.
+        diamond_radii(bisection, z, spacing_m, *std::max_element(base_m.begin(), base_m.end()) + kBallPad * reach_m,
+                      radius);
         saturate(bisection, z, spacing_m, error, radius);
         if (!header.is_leaf()) {
             add_base_errors(bisection, base_m, error);
