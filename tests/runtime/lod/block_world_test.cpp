@@ -276,7 +276,7 @@ TEST(BlockWorld, SinglePrecisionNeverDropsAVertexThatTheGuaranteedTestSelects) {
 // A slope of its own for each block, at a height of its own: cliffs between, and twisted strips.
 HeightRaster cliffs(Random& random, std::int64_t columns, std::int64_t rows) {
     std::vector<std::array<double, 3>> blocks;
-    for (std::int64_t k = 0; k < columns * rows / (33 * 33); ++k)
+    for (std::int64_t k = 0; k < (columns / 33) * (rows / 33); ++k)
         blocks.push_back({real(random, 0, 400), real(random, -6, 6), real(random, -6, 6)});
     return raster_of(columns, rows, 30, [&](std::int64_t i, std::int64_t j) {
         const auto& b = blocks[static_cast<std::size_t>(j / 33 * (columns / 33) + i / 33)];
@@ -542,8 +542,9 @@ TEST(HeightRaster, IsRefusedWhereItWouldNotFitOrIsNotWhole) {
         return raster.ok() ? std::string() : raster.error().message;
     };
     const test::SyntheticTerrain whole(shape, test::rough_heights(5, 300));
-    EXPECT_EQ(refusal(whole, 65 * 65 * 100), "");
-    EXPECT_NE(refusal(whole, 65 * 65 * 100 - 1).find("--budget"), std::string::npos);
+    constexpr std::int64_t kNeeded = std::int64_t{65} * 65 * 100;
+    EXPECT_EQ(refusal(whole, kNeeded), "");
+    EXPECT_NE(refusal(whole, kNeeded - 1).find("--budget"), std::string::npos);
     const test::SyntheticTerrain holed(shape, test::rough_heights(5, 300),
                                        [](std::int64_t i, std::int64_t j) { return i != 20 || j != 30; });
     EXPECT_NE(refusal(holed, 1 << 30).find("absent"), std::string::npos);
