@@ -12,7 +12,7 @@ constexpr double kRadiusShare = 0.16;
 constexpr int kSize = 800;
 constexpr double kFov = 40;
 constexpr std::int64_t kNearBy = 4;  ///< samples
-constexpr int kSmoothing = 40;        ///< frames to either side
+constexpr int kSmoothing = 40;       ///< frames to either side
 
 struct Round {
     double x = 0, y = 0, heading = 0;
@@ -91,6 +91,7 @@ std::vector<Camera> steep(const HeightRaster& raster, double step_m, int frames)
 std::vector<Camera> low(const HeightRaster& raster, double step_m, int frames) {
     const auto places = round_trip(raster, step_m, frames);
     std::vector<double> floor;
+    floor.reserve(places.size());
     for (const Round& p : places) floor.push_back(highest_near(raster, p));
     const auto smooth = smooth_above(floor);
     std::vector<Camera> cameras;

@@ -29,7 +29,7 @@ double share(std::int64_t part, std::int64_t whole) {
 double missing_share(const SelectionTruth& s) { return share(s.failing_missing, s.wanted); }
 
 const std::vector<Column>& columns() {
-    static const std::vector<Column> all{
+    static const std::vector<Column> kColumns{
         {"flight", [](const Row& r) { return r.flight; }},
         {"step_m", [](const Row& r) { return number(r.step_m); }},
         {"metric", [](const Row& r) { return name_of(r.rules.metric); }},
@@ -61,7 +61,7 @@ const std::vector<Column>& columns() {
          [](const Row& r) { return number(share(r.figures.truth.strips_above, r.figures.truth.strips)); }},
         {"promise_px", [](const Row& r) { return r.is_guaranteed() ? number(r.promise_px()) : std::string(); }},
     };
-    return all;
+    return kColumns;
 }
 
 std::vector<const Row*> of_table(const std::vector<Row>& rows, const std::string& table) {

@@ -17,7 +17,8 @@ namespace scree {
 namespace {
 
 constexpr int kMaxBlockCellsLog2 = 5;
-constexpr std::size_t kMaxBlockVertices = ((1 << kMaxBlockCellsLog2) + 1) * ((1 << kMaxBlockCellsLog2) + 1);
+constexpr std::size_t kMaxBlockRow = (std::size_t{1} << kMaxBlockCellsLog2) + 1;
+constexpr std::size_t kMaxBlockVertices = kMaxBlockRow * kMaxBlockRow;
 constexpr int kGroup = 4;  ///< blocks a side that are culled at once
 
 enum Side { kWest, kEast, kNorth, kSouth };
@@ -129,8 +130,9 @@ void BlockWorld::make_tables() {
     first_of_level_.push_back(order_size_);
     const double half = 0.5 * b.cells();
     for (const std::int32_t v : order) {
-        x_.push_back(static_cast<float>((v % b.row() - half) * spacing_m_));
-        y_.push_back(static_cast<float>((half - v / b.row()) * spacing_m_));
+        const std::int32_t i = v % b.row(), j = v / b.row();
+        x_.push_back(static_cast<float>((i - half) * spacing_m_));
+        y_.push_back(static_cast<float>((half - j) * spacing_m_));
         vertex_of_.push_back(static_cast<std::uint16_t>(v));
         const auto place = [&](std::int32_t p) {
             return p < 0 ? static_cast<std::uint16_t>(order_size_) : order_of_[static_cast<std::size_t>(p)];
@@ -267,7 +269,7 @@ void BlockWorld::make_dikes() {
 std::int64_t BlockWorld::complete_triangles() const {
     const std::int64_t m = bisection_->cells(), strips = static_cast<std::int64_t>(strips_.size()),
                        quads = static_cast<std::int64_t>(quads_.size()) / 6;
-    return block_count() * 2 * m * m + strips * 2 * m + quads * 2;
+    return std::int64_t{block_count()} * 2 * m * m + strips * 2 * m + quads * 2;
 }
 
 glm::dvec3 BlockWorld::position(std::uint32_t vertex) const {
@@ -372,7 +374,7 @@ void BlockWorld::choose(int index, const Sighting& sighting, std::uint8_t* activ
         if (test_level(index, level, sighting, distance_m, fails.data())) finest = level;
     std::memset(active, 0, bisection_->vertex_count());
     const int m = bisection_->cells();
-    for (const int corner : {0, m, m * bisection_->row(), m * bisection_->row() + m}) active[corner] = 1;
+    for (const std::int32_t corner : {0, m, bisection_->index(0, m), bisection_->index(m, m)}) active[corner] = 1;
     for (std::size_t k = first_of_level_[static_cast<std::size_t>(finest) + 1]; k-- > 0;) {
         const std::uint8_t fail = fails[k];
         fails[parent_0_[k]] |= fail;
@@ -442,13 +444,14 @@ void BlockWorld::make_mesh(int index) {
 
 void BlockWorld::take_sides(int index) {
     const std::uint8_t* active = active_.data() + static_cast<std::size_t>(index) * (bisection_->vertex_count() + 1);
-    const int m = bisection_->cells(), row = bisection_->row();
+    const int m = bisection_->cells();
     std::array<std::uint64_t, 4> sides{};
+    const auto bit = [&](int i, int j) { return std::uint64_t{active[bisection_->index(i, j)]}; };
     for (int y = 0; y <= m; ++y) {
-        sides[kWest] |= std::uint64_t{active[y * row]} << y;
-        sides[kEast] |= std::uint64_t{active[y * row + m]} << y;
-        sides[kNorth] |= std::uint64_t{active[y]} << y;
-        sides[kSouth] |= std::uint64_t{active[m * row + y]} << y;
+        sides[kWest] |= bit(0, y) << y;
+        sides[kEast] |= bit(m, y) << y;
+        sides[kNorth] |= bit(y, 0) << y;
+        sides[kSouth] |= bit(y, m) << y;
     }
     blocks_[static_cast<std::size_t>(index)].sides = sides;
 }

@@ -17,47 +17,47 @@ class PaperTables : public testing::Test {
 protected:
     // One run serves all tests of a process.
     static void SetUpTestSuite() {
-        folder_ = new test::TemporaryFolder;
-        const std::string store = folder_->file("small.scree");
-        const auto made = test::scree({"synth", "-o", folder_->file("land"), "--size", "330", "--spacing", "40",
+        folder = new test::TemporaryFolder;
+        const std::string store = folder->file("small.scree");
+        const auto made = test::scree({"synth", "-o", folder->file("land"), "--size", "330", "--spacing", "40",
                                        "--imagery-scale", "0", "--quiet"});
         ASSERT_EQ(made.exit_code, 0) << describe(made);
-        const auto built = test::scree({"build", folder_->file("land") + "/dem.tif", "-o", store, "--quiet"});
+        const auto built = test::scree({"build", folder->file("land") + "/dem.tif", "-o", store, "--quiet"});
         ASSERT_EQ(built.exit_code, 0) << describe(built);
         const auto run = test::run_program(
-            SCREE_PAPER_TABLES, {"--store", store, "--out", folder_->file("out"), "--name", "small", "--quick"});
+            SCREE_PAPER_TABLES, {"--store", store, "--out", folder->file("out"), "--name", "small", "--quick"});
         ASSERT_EQ(run.exit_code, 0) << describe(run);
         const auto bytes = test::read_bytes(file("paper_small.json"));
-        report_ = nlohmann::json::parse(bytes.begin(), bytes.end(), nullptr, false);
-        ASSERT_FALSE(report_.is_discarded());
+        report = nlohmann::json::parse(bytes.begin(), bytes.end(), nullptr, false);
+        ASSERT_FALSE(report.is_discarded());
     }
     static void TearDownTestSuite() {
-        delete folder_;
-        folder_ = nullptr;
+        delete folder;
+        folder = nullptr;
     }
-    static std::string file(const std::string& name) { return folder_->file("out") + "/" + name; }
+    static std::string file(const std::string& name) { return folder->file("out") + "/" + name; }
     static double value(const nlohmann::json& run, const char* key) { return run.at(key).get<double>(); }
 
     // Runs of a table by metric and cache; fails where there is none.
     static std::vector<nlohmann::json> runs(const std::string& table, const std::string& metric,
                                             const std::string& reuse) {
         std::vector<nlohmann::json> found;
-        for (const auto& run : report_.at("runs"))
+        for (const auto& run : report.at("runs"))
             if (run.at("table") == table && run.at("metric") == metric && run.at("reuse") == reuse)
                 found.push_back(run);
         EXPECT_FALSE(found.empty()) << table << ", " << metric << ", " << reuse;
         return found;
     }
 
-    static test::TemporaryFolder* folder_;
-    static nlohmann::json report_;
+    static test::TemporaryFolder* folder;
+    static nlohmann::json report;
 };
-test::TemporaryFolder* PaperTables::folder_ = nullptr;
-nlohmann::json PaperTables::report_;
+test::TemporaryFolder* PaperTables::folder = nullptr;
+nlohmann::json PaperTables::report;
 
 TEST_F(PaperTables, DrawAsManyTrianglesAsEver) {
-    EXPECT_EQ(report_.at("complete_triangles"), 2 * 329 * 329);
-    EXPECT_EQ(report_.at("dropped_columns"), 0);
+    EXPECT_EQ(report.at("complete_triangles"), 2 * 329 * 329);
+    EXPECT_EQ(report.at("dropped_columns"), 0);
     const std::vector<std::tuple<const char*, const char*, const char*, const char*, double>> expected{
         {"caching", "UC", "off", "blind", 1895},  {"caching", "UC", "P1", "blind", 1796},
         {"caching", "N*K", "off", "aware", 2831}, {"caching", "N*K", "exact", "aware", 2746},
@@ -89,7 +89,7 @@ TEST_F(PaperTables, TheExactCacheNeverExceedsTauPlusSAndP1Does) {
 
 TEST_F(PaperTables, WhatIsPromisedIsKeptAndWhatIsNotIsBroken) {
     int promises = 0;
-    for (const auto& run : report_.at("runs")) {
+    for (const auto& run : report.at("runs")) {
         EXPECT_TRUE(run.at("keeps_promise")) << run.dump();
         if (!run.at("promise_px").is_number()) continue;
         ++promises;
@@ -133,11 +133,11 @@ TEST_F(PaperTables, LeaveTablesChartsAndAPage) {
 }
 
 TEST_F(PaperTables, RefuseAStoreThatDoesNotFitTheBudget) {
-    const auto run = test::run_program(SCREE_PAPER_TABLES, {"--store", folder_->file("small.scree"), "--out",
-                                                            folder_->file("none"), "--budget", "1M"});
+    const auto run = test::run_program(
+        SCREE_PAPER_TABLES, {"--store", folder->file("small.scree"), "--out", folder->file("none"), "--budget", "1M"});
     EXPECT_EQ(run.exit_code, 2);
     EXPECT_NE(run.err.find("--budget"), std::string::npos) << run.err;
-    EXPECT_FALSE(std::filesystem::exists(folder_->file("none")));
+    EXPECT_FALSE(std::filesystem::exists(folder->file("none")));
 }
 
 }  // namespace
