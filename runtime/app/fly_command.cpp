@@ -50,7 +50,7 @@ struct FlyOptions {
 };
 
 struct FlightLog {
-    Series frame_ms, select_ms, triangles, tiles, tau, bound, mean_bound;
+    Series frame_ms, select_ms, triangles, tiles, tau, bound, mean_bound, tiles_reused;
     Series settled_triangles, settled_mean_bound;  // of the same poses, when nothing is missing
     std::int64_t stand_ins = 0, reused = 0, holes = 0, limited = 0, see_through = 0, looked_through = 0;
     double coarse_after_ms = 0, true_after_ms = 0;  // from the context on; 0: never
@@ -161,6 +161,7 @@ private:
         if (log_.coarse_after_ms == 0 && s.max_bound_px <= kColdStartPx) log_.coarse_after_ms = since_context;
         if (log_.true_after_ms == 0 && s.max_bound_px <= options_.tau_px * (1 + 1e-9))
             log_.true_after_ms = since_context;
+        if (scene_.mesher() != nullptr) log_.tiles_reused.add(scene_.mesher()->counters().reused_share());
         log_.add(k, ms, *frame,
                  count_holes(scene_.dataset(), scene_.pager().residency(), camera, s.draws[0], frame->half_curvature));
         if (fly_.see_through)
@@ -247,6 +248,9 @@ nlohmann::ordered_json report_of(const FlightLog& log, const Scene& scene, const
         {"textures_loaded", loader_report(scene.loader_counters(TileKind::texture))},
         {"frames_with_stand_ins", log.stand_ins},
         {"selections_reused", log.reused},
+        {"lod", command_line_of(o.lod)},
+        {"guaranteed", o.lod.is_guaranteed()},
+        {"tiles_reused_share", log.tiles_reused.values.empty() ? 0 : log.tiles_reused.mean()},
         {"budget_limited_frames", log.limited},
         {"holes", log.holes},
         {"max_bound_px", log.bound.max()},

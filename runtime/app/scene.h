@@ -78,6 +78,7 @@ public:
     LoaderCounters loader_counters(TileKind kind) const;
     const Pager& pager() const { return *pager_; }
     SceneOptions& options() { return options_; }
+    const SceneOptions& options() const { return options_; }
 
     /// Once a frame, where options.follow is set: takes up what an update has made of the store. It is loaded beside
     /// what is drawn, and drawn once it is as complete. Waits for nothing, unless memory must be divided anew, which

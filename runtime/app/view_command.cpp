@@ -31,6 +31,11 @@ HudLines status_lines(const Scene& scene, const SceneFrame& frame, const FlightP
         s.budget_limited ? fmt::format(", the budget allows {:.1f} px", s.tau_effective_px) : "",
         scene.updates() > 0 ? fmt::format(", update {}", scene.updates()) : "", pose.eye.x, pose.eye.y, pose.eye.z,
         speed);
+    if (scene.mesher() != nullptr) {
+        const MeshCounters& c = scene.mesher()->counters();
+        lines.title += fmt::format("   {}", to_string(scene.options().lod.method));
+        lines.title += fmt::format(", {:.0f} % reused", 100 * c.reused_share());
+    }
     lines.credit = scene.dataset().attribution;
     return lines;
 }
