@@ -92,13 +92,16 @@ const std::vector<std::uint8_t>& TileVertices::allowed(const TileShape& shape) {
     return table;
 }
 
-// Tests are monotone up the hierarchy but for their roundings, or not at all (the paper's): parents follow.
-void TileVertices::finish(const TileShape& shape, std::uint8_t* active) {
+void TileVertices::restrict_to(const TileShape& shape, std::uint8_t* active) {
     const std::vector<std::uint8_t>& may = allowed(shape);
     for (std::size_t v = 0; v < vertices_; ++v) active[v] &= may[v];
     const Bisection& b = bisection(shape.tile);
     for (const int j : {0, m_})
         for (const int i : {0, m_}) active[b.index(i, j)] = 1;
+}
+
+void TileVertices::add_parents(const TileShape& shape, std::uint8_t* active) const {
+    const Bisection& b = bisection(shape.tile);
     const auto order = b.coarse_to_fine();
     for (std::size_t k = order.size(); k-- > 0;) {
         if (active[order[k]] == 0) continue;
@@ -140,7 +143,9 @@ void TileVertices::choose(const TileShape& shape, std::span<const VertexEye> eye
                        fails_.data());
         for (std::size_t v = 0; v < vertices_; ++v) active[v] |= fails_[v];
     }
-    finish(shape, active);
+    restrict_to(shape, active);
+    // The test is monotone up the hierarchy but for its roundings, or not at all (the paper's).
+    add_parents(shape, active);
 }
 
 void TileVertices::choose(const TileShape& shape, double threshold_m, double half_curvature, std::uint8_t* active) {
@@ -151,8 +156,9 @@ void TileVertices::choose(const TileShape& shape, double threshold_m, double hal
         error = errors_.data();
     }
     const auto threshold = static_cast<float>(threshold_m * (1 - 1e-6));
+    // Saturated errors are monotone, and so are their sums, rounded.
     fails_threshold(error, vertices_, threshold, active);
-    finish(shape, active);
+    restrict_to(shape, active);
 }
 
 bool TileVertices::complete_if_dense(const TileShape& shape, std::uint8_t* active) {

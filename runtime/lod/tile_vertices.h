@@ -64,7 +64,8 @@ private:
     /// Vertices that a tile of a stride with some edges thinned has, corners left out.
     const std::vector<std::uint8_t>& allowed(const TileShape& shape);
     const std::vector<float>& places(int level);
-    void finish(const TileShape& shape, std::uint8_t* active);
+    void restrict_to(const TileShape& shape, std::uint8_t* active);
+    void add_parents(const TileShape& shape, std::uint8_t* active) const;
     std::size_t at(std::int32_t slot) const { return static_cast<std::size_t>(slot) * vertices_; }
     double spacing_m(TileId tile) const;
 
