@@ -47,9 +47,13 @@ forbid common "$opengl|$window|$images|$proj" "common/ sees no OpenGL, no window
 forbid "common/mesh common/store" 'common/query/' "common/mesh and common/store lie below common/query:"
 forbid tools 'runtime/' "tools/ and runtime/ never meet:"
 forbid runtime 'tools/' "runtime/ and tools/ never meet:"
-forbid "$below_render" 'runtime/render/|runtime/app/' "runtime/view, paging and lod lie below render and app:"
-forbid "$below_render" "$window" "runtime/view, paging and lod know no window:"
-forbid runtime/render 'runtime/app/' "runtime/render lies below app:"
+forbid "$below_render" 'runtime/render/|runtime/scene/|runtime/app/' \
+    "runtime/view, paging and lod lie below scene, render and app:"
+forbid "$below_render runtime/scene" "$window" "runtime/view, paging, lod and scene know no window:"
+forbid runtime/render 'runtime/scene/|runtime/app/' "runtime/render lies below scene_renderer and app:"
+forbid runtime/scene 'runtime/app/' "runtime/scene lies below app:"
+forbid runtime/scene 'runtime/render/' "of runtime/scene, scene_renderer alone knows the renderer:" \
+    'runtime/scene/scene_renderer\.'
 forbid "tools runtime" "$opengl" "OpenGL and EGL headers stand in runtime/render alone:" 'runtime/render/'
 forbid tools "$window" "tools/ knows no window:"
 forbid "tools runtime" "$images" "OpenImageIO, libgeotiff and libtiff stand in tools/source alone:" 'tools/source/'

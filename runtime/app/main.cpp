@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "common/cli/completion.h"
 #include "common/report.h"
 #include "runtime/app/commands.h"
 
@@ -20,8 +21,20 @@ struct Command {
 constexpr std::array<Command, 3> kCommands{
     {{"shot", scree::run_shot}, {"fly", scree::run_fly}, {"audit", scree::run_audit}}};
 
+// For the build, which installs what this prints.
+int print_completion() {
+    fmt::print("{}", scree::completion_head("scree-view", {"shot", "fly", "audit"}, true));
+    std::string name = "scree-view", flag = "--completion-case";
+    std::array<char*, 3> arguments{name.data(), flag.data(), nullptr};
+    for (const Command& c : kCommands) c.run(2, arguments.data());
+    scree::run_view(2, arguments.data());
+    fmt::print("{}", scree::completion_tail("scree-view"));
+    return 0;
+}
+
 int dispatch(int argc, char** argv) {
     const std::string_view name = argc > 1 ? argv[1] : "";
+    if (name == "--completion") return print_completion();
     for (const Command& c : kCommands)
         if (c.name == name) return c.run(argc - 1, argv + 1);
     return scree::run_view(argc, argv);

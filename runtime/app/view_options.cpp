@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "common/cli/arguments.h"
 #include "common/report.h"
 
 namespace scree {
@@ -20,9 +21,10 @@ void add_view_options(CLI::App& app, ViewOptions& o) {
     app.add_option("--budget", o.budget, "Ceiling of tile memory, such as 256M")->capture_default_str();
     app.add_option("--curvature", o.curvature_text,
                    "Lower what is far away as the earth does: auto (where it shows), on, off")
+        ->type_name("auto|on|off")
         ->capture_default_str();
     app.add_flag("--no-morph", o.no_morph, "Draw discrete levels: nothing moves, changes pop");
-    app.add_option("--json", o.json, "Write the report as JSON to a file, or - for standard output");
+    add_json_option(app, o.json);
 }
 
 Result<void> check_view_options(ViewOptions& o) {
@@ -66,15 +68,6 @@ Result<FlightPath> flight_of(const TileStore& store, const ViewOptions& o, int f
     auto path = read_flight_path(*o.path);
     if (!path) return path;
     return resample(*path, frames);
-}
-
-int parse_arguments(CLI::App& app, int argc, char** argv) {
-    try {
-        app.parse(argc, argv);
-    } catch (const CLI::ParseError& error) {
-        return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorCode::usage);
-    }
-    return -1;
 }
 
 }  // namespace scree

@@ -82,6 +82,7 @@ public:
     void upload_height(int slot, std::span<const SlotVertex> vertices);
     void upload_texture(int slot, std::span<const std::uint8_t> chain);
 
+    /// Takes state that it does not set (masks, stencil, polygon offset) for OpenGL's initial one.
     /// Clears `target`, draws `items` (slots uploaded before; at most max_draws) and the sky. The camera's size is the
     /// target's.
     FrameTimes draw(const Camera& camera, std::span<const DrawItem> items, const FrameSettings& settings,
@@ -91,6 +92,10 @@ public:
     /// that compile at the first draw (software OpenGL: up to half a second, unless it kept the result of an earlier
     /// run) then do so now and not in mid-flight. What it draws means nothing.
     std::uint32_t warm_up(const FrameSettings& settings, RenderTarget& target);
+
+    /// Puts the state of the context that draw() and RenderTarget's readings and blits change back to OpenGL's initial
+    /// one, for programs that draw things of their own; the viewport and what texture units hold excepted.
+    static void reset_state();
 
 private:
     struct State;

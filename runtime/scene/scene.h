@@ -11,9 +11,9 @@
 #include <string>
 
 #include "common/store/sqlite_store.h"
-#include "runtime/app/store_watch.h"
 #include "runtime/lod/selection.h"
 #include "runtime/paging/pager.h"
+#include "runtime/scene/store_watch.h"
 #include "runtime/view/curvature.h"
 #include "runtime/view/foresight.h"
 
@@ -32,6 +32,8 @@ struct SceneOptions {
     bool textures = true;
     bool follow = false;  ///< take up what updates make of the store; else a changed store is an error of complete()
     std::int64_t upload_bytes_per_frame = 4 << 20;  ///< about 90 textures; larger arrives sooner and may hitch
+    /// Told what is wrong and is borne: a damaged tile, an update that cannot be opened. Empty: to standard error.
+    std::function<void(const std::string& message)> on_trouble{};
 };
 
 /// Times and counts of one frame's thinking, before anything is drawn.
@@ -91,6 +93,7 @@ private:
     Scene(std::shared_ptr<const SqliteStore> store, const SceneOptions& options, const MemoryPlan& memory);
     void make_selectors();
     void forget_selections();
+    void tell(const std::string& message) const;
     Result<void> make_pager();
     Result<void> use_store(std::shared_ptr<const SqliteStore> store);
     Result<void> expect_same_place(const SqliteStore& next) const;
