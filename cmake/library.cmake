@@ -45,6 +45,7 @@ function(scree_install_library)
     install(FILES ${PROJECT_BINARY_DIR}/screeConfig.cmake ${PROJECT_BINARY_DIR}/screeConfigVersion.cmake
             DESTINATION ${place} COMPONENT dev)
     install(EXPORT scree_targets NAMESPACE scree:: FILE screeTargets.cmake DESTINATION ${place} COMPONENT dev)
+    file(RELATIVE_PATH prefix_from_pc /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
     configure_file(${PROJECT_SOURCE_DIR}/cmake/scree.pc.in ${PROJECT_BINARY_DIR}/scree.pc @ONLY)
     install(FILES ${PROJECT_BINARY_DIR}/scree.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT dev)
 endfunction()

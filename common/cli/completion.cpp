@@ -56,8 +56,8 @@ std::string completion_head(std::string_view program, const std::vector<std::str
         "# bash completion for {0}, from what its --help says\n"
         "_{1}() {{\n"
         "    local current=${{COMP_WORDS[COMP_CWORD]}} previous=${{COMP_WORDS[COMP_CWORD - 1]}}\n"
-        "    local options= words= kind=nothing command=${{COMP_WORDS[1]}}\n"
-        "    ((COMP_CWORD > 1)) || command= previous=\n"
+        "    local options='' words='' kind=nothing command=${{COMP_WORDS[1]}}\n"
+        "    ((COMP_CWORD > 1)) || command='' previous=''\n"
         "    case $command in\n"
         "{2}",
         program, program == "scree" ? "scree" : "scree_view",

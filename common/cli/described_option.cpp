@@ -56,10 +56,12 @@ bool is_lower(char c) { return c >= 'a' && c <= 'z'; }
 
 }  // namespace
 
+// Groups of options have a --help of their own, which is nobody's.
 std::vector<DescribedOption> described_options(const CLI::App& app) {
     std::vector<DescribedOption> out;
     for (const CLI::Option* option : app.get_options())
-        if (!option->get_group().empty()) out.push_back(described(*option));
+        if (!option->get_group().empty() && (app.get_parent() == nullptr || option != app.get_help_ptr()))
+            out.push_back(described(*option));
     for (const CLI::App* group : app.get_subcommands([](const CLI::App* a) { return a->get_name().empty(); }))
         for (DescribedOption& option : described_options(*group)) out.push_back(std::move(option));
     return out;
