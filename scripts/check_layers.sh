@@ -45,6 +45,7 @@ below_render='runtime/view runtime/paging runtime/lod'
 forbid common 'tools/|runtime/' "common/ includes neither tools/ nor runtime/:"
 forbid common "$opengl|$window|$images|$proj" "common/ sees no OpenGL, no window, no image library, no PROJ:"
 forbid "common/mesh common/store" 'common/query/' "common/mesh and common/store lie below common/query:"
+forbid "common/mesh common/store common/query" 'common/cli/|common/c_api/' "common/cli and c_api lie above the rest of common:"
 forbid tools 'runtime/' "tools/ and runtime/ never meet:"
 forbid runtime 'tools/' "runtime/ and tools/ never meet:"
 forbid "$below_render" 'runtime/render/|runtime/scene/|runtime/app/' \

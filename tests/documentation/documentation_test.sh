@@ -76,8 +76,7 @@ completion() {
     # shellcheck source=/dev/null
     source "$pages/scree-view"
     complete -p scree scree-view >/dev/null || fail "nothing is registered"
-    local folder
-    folder=$(mktemp -d)
+    folder=$(mktemp -d) # not local: the trap wants it
     trap 'rm -rf -- "$folder"' EXIT
     cd -- "$folder"
     mkdir alps.d
