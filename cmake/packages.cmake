@@ -17,7 +17,7 @@ set(CPACK_DEBIAN_PACKAGE_PRIORITY optional)
 # scree_package(COMPONENT PACKAGE SECTION DESCRIPTION): what is the same for all of them.
 function(scree_package component package section description)
     string(TOUPPER ${component} upper)
-    foreach(field NAME SECTION SHLIBDEPS DEPENDS RECOMMENDS SUGGESTS)
+    foreach(field SHLIBDEPS DEPENDS RECOMMENDS SUGGESTS)
         set(CPACK_DEBIAN_${upper}_PACKAGE_${field} "${package_${field}}" PARENT_SCOPE)
     endforeach()
     set(CPACK_DEBIAN_${upper}_PACKAGE_NAME ${package} PARENT_SCOPE)
@@ -39,18 +39,18 @@ execute_process(COMMAND ${SCREE_GZIP} -9nkf changelog changelog.Debian WORKING_D
 set(package_SHLIBDEPS ON)
 set(package_SUGGESTS scree-view)
 scree_package(scree scree science "builder of terrain pyramids
- Cuts elevation models and orthophotos, in any CRS and any usual format, into
- a pyramid of height and DXT1 texture tiles in one file, within a ceiling of
- memory. Says what such a store holds, checks it, updates it, asks it for
- heights, and exports parts of it.")
+Cuts elevation models and orthophotos, in any CRS and any usual format, into
+a pyramid of height and DXT1 texture tiles in one file, within a ceiling of
+memory. Says what such a store holds, checks it, updates it, asks it for
+heights, and exports parts of it.")
 
 # Drivers are looked for when the program runs.
-set(package_RECOMMENDS "libegl1, libgl1, libgl1-mesa-dri")
+set(package_RECOMMENDS "libgl1, libgl1-mesa-dri")
 set(package_SUGGESTS scree)
 scree_package(scree-view scree-view science "flight over terrain pyramids within a pixel of the data
- Draws the stores that scree builds with OpenGL 4.5, in a window or without:
- tiles are paged within a fixed budget, and what is drawn stays within a given
- number of pixels of the finest data. Software drivers will do.")
+Draws the stores that scree builds with OpenGL 4.5, in a window or without:
+tiles are paged within a fixed budget, and what is drawn stays within a given
+number of pixels of the finest data. Software drivers will do.")
 
 set(package_SHLIBDEPS OFF)
 unset(package_RECOMMENDS)
@@ -58,8 +58,8 @@ set(package_SUGGESTS scree)
 set(package_DEPENDS "libc6-dev, libegl-dev, libepoxy-dev, libfmt-dev, libglm-dev, libpng-dev, libsqlite3-dev, libssl-dev, \
 libstdc++-12-dev | libstdc++-dev, libxxhash-dev, libzstd-dev, pkg-config | pkgconf")
 scree_package(dev libscree-dev libdevel "terrain pyramids in programs of your own: library and headers
- Static libraries for C++20 and CMake: scree::common reads stores, answers
- heights and rays; scree::runtime chooses and pages what is to be drawn, without
- OpenGL; scree::gl draws it in an OpenGL context of yours. Heights from C, too.")
+Static libraries for C++20 and CMake: scree::common reads stores, answers
+heights and rays; scree::runtime chooses and pages what is to be drawn, without
+OpenGL; scree::gl draws it in a context of yours. Heights from C, too.")
 
 include(CPack)
