@@ -44,7 +44,7 @@ int show(GLFWwindow* window, const char* path, int frames, const char* picture) 
     options.tau_px = 1;                              // what is drawn is within a pixel of the finest data
     auto scene = Scene::open(**store, options);
     if (!scene) return fail(scene.error());
-    auto renderer = SceneRenderer::create((*scene)->dataset(), (*scene)->memory());
+    auto renderer = SceneRenderer::create(**scene);
     if (!renderer) return fail(renderer.error());
     if (auto ok = (*scene)->start(**renderer); !ok) return fail(ok.error());
 

@@ -29,11 +29,10 @@ FrameSettings scenery(const Dataset& d) {
     return s;
 }
 
-Result<std::unique_ptr<SceneRenderer>> SceneRenderer::create(const Dataset& dataset, const MemoryPlan& plan,
-                                                             const SceneRendererOptions& options) {
+Result<std::unique_ptr<SceneRenderer>> SceneRenderer::create(const Scene& scene, const SceneRendererOptions& options) {
     std::unique_ptr<SceneRenderer> made(new SceneRenderer(options));
-    made->settings_ = scenery(dataset);
-    if (auto ok = made->make_renderer(dataset, plan); !ok) return ok.error();
+    made->settings_ = scenery(scene.dataset());
+    if (auto ok = made->make_renderer(scene.dataset(), scene.memory()); !ok) return ok.error();
     return made;
 }
 

@@ -4,7 +4,7 @@
 //
 //     auto context = borrow_current_context();                      // checks what the window's maker made
 //     auto scene = Scene::open(store, {});
-//     auto renderer = SceneRenderer::create((*scene)->dataset(), (*scene)->memory());
+//     auto renderer = SceneRenderer::create(**scene);
 //     auto target = RenderTarget::create({width_px, height_px});
 //     (*scene)->start(**renderer);
 //     each frame:
@@ -31,8 +31,7 @@ class SceneRenderer final : public TileSink {
 public:
     /// Takes all of the scene's tile memory, and has the driver compile what frames will need. Errors
     /// (ErrorCode::display): those of Renderer and RenderTarget.
-    static Result<std::unique_ptr<SceneRenderer>> create(const Dataset& dataset, const MemoryPlan& plan,
-                                                         const SceneRendererOptions& options = {});
+    static Result<std::unique_ptr<SceneRenderer>> create(const Scene& scene, const SceneRendererOptions& options = {});
 
     Result<void> renew(const Dataset& dataset, const MemoryPlan& plan) override;
     /// renew() would leave slots and what they hold as they are.
