@@ -48,6 +48,7 @@ forbid "common/mesh common/store" 'common/query/' "common/mesh and common/store 
 forbid "common/mesh common/store common/query" 'common/cli/|common/c_api/' "common/cli and c_api lie above the rest of common:"
 forbid tools 'runtime/' "tools/ and runtime/ never meet:"
 forbid runtime 'tools/' "runtime/ and tools/ never meet:"
+forbid "common tools runtime" 'experiments/' "experiments/ is included by nothing but its tests:"
 forbid "$below_render" 'runtime/render/|runtime/scene/|runtime/app/' \
     "runtime/view, paging and lod lie below scene, render and app:"
 forbid "$below_render runtime/scene" "$window" "runtime/view, paging, lod and scene know no window:"

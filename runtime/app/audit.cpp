@@ -105,7 +105,7 @@ Result<void> audit_frame(const TileStore& store, TileReader& reader, const Audit
     DrawnTile drawn(
         l, make_relative_frame(l, d.height_offset_m, d.height_quantum_m, frame.camera.eye, frame.half_curvature));
     for (const DrawItem& item : frame.draws) {
-        drawn.set(item, frame.arena.vertices(item.height_slot));
+        if (auto set = drawn.set(item, frame.arena.vertices(item.height_slot), frame.meshes); !set) return set;
         const LatticePoint corner = l.corner(item.tile);
         auto ok = for_each_leaf(reader, l, item.tile, [&](TileId id, const HeightTile& leaf) {
             const auto present = present_vertices(leaf.presence, l.tile_cells_log2);
@@ -161,8 +161,8 @@ private:
 
 }  // namespace
 
-void audit_against(const Dataset& d, const SourceJudge& source, const AuditedFrame& frame, double stated_m,
-                   ErrorHistogram& errors, double& excess_px) {
+Result<void> audit_against(const Dataset& d, const SourceJudge& source, const AuditedFrame& frame, double stated_m,
+                           ErrorHistogram& errors, double& excess_px) {
     const Lattice& l = d.lattice;
     const Judge judge(frame);
     const TileMap tiles(l, frame.draws);
@@ -171,7 +171,7 @@ void audit_against(const Dataset& d, const SourceJudge& source, const AuditedFra
     DrawnTile drawn(
         l, make_relative_frame(l, d.height_offset_m, d.height_quantum_m, frame.camera.eye, frame.half_curvature));
     for (const DrawItem& item : frame.draws) {
-        drawn.set(item, frame.arena.vertices(item.height_slot));
+        if (auto set = drawn.set(item, frame.arena.vertices(item.height_slot), frame.meshes); !set) return set;
         const LatticePoint corner = l.corner(item.tile);
         const std::int64_t extent = l.tile_extent(item.tile.level);
         const auto last = static_cast<double>(extent);
@@ -196,6 +196,7 @@ void audit_against(const Dataset& d, const SourceJudge& source, const AuditedFra
                 }
         });
     }
+    return {};
 }
 
 }  // namespace scree

@@ -38,15 +38,18 @@ struct AuditedFrame {
     const Camera& camera;
     const DrawList& draws;
     const CpuArena& arena;
-    double half_curvature = 0;  ///< the truth is lowered by it as well, exactly
+    double half_curvature = 0;         ///< the truth is lowered by it as well, exactly
+    const MeshPool* meshes = nullptr;  ///< that the draws' meshes are held in; null where none has one
 };
 
-/// Adds the errors of one drawn frame against the store's finest tiles. Errors: those of the store.
+/// Adds the errors of one drawn frame against the store's finest tiles. Errors: those of the store;
+/// ErrorCode::check_failed for a mesh that does not cover its tile once (DrawnTile::set).
 Result<void> audit_frame(const TileStore& store, TileReader& reader, const AuditedFrame& frame, ErrorHistogram& errors);
 
 /// Adds the errors of one drawn frame against the judged samples of a source that are in view. `stated_m`: what the
 /// store states of its own heights (warp, quantum); the greatest error beyond what that is seen as goes to `excess_px`.
-void audit_against(const Dataset& dataset, const SourceJudge& source, const AuditedFrame& frame, double stated_m,
-                   ErrorHistogram& errors, double& excess_px);
+/// Errors: ErrorCode::check_failed, as audit_frame.
+Result<void> audit_against(const Dataset& dataset, const SourceJudge& source, const AuditedFrame& frame,
+                           double stated_m, ErrorHistogram& errors, double& excess_px);
 
 }  // namespace scree

@@ -61,7 +61,7 @@ struct Audit {
         const Selection& s = *frame->selection;
         const DrawList& draws = s.draws[0];
         const Dataset& d = store.dataset();
-        const AuditedFrame audited{camera, draws, arena, frame->half_curvature};
+        const AuditedFrame audited{camera, draws, arena, frame->half_curvature, scene.meshes()};
         // What was promised: tau, or the stated bound where residency, the budget or the data's depth do not allow it.
         const double promised_px = std::max(options.tau_px, s.max_bound_px) + kRoundingPx;
         ErrorHistogram errors;
@@ -71,12 +71,13 @@ struct Audit {
         result.errors.merge(errors);
         for (const SourceJudge& source : sources) {
             double excess_px = 0;
-            audit_against(d, source, audited, d.warp_error_m + d.height_quantum_error_m, result.source_errors,
-                          excess_px);
+            auto ok = audit_against(d, source, audited, d.warp_error_m + d.height_quantum_error_m, result.source_errors,
+                                    excess_px);
+            if (!ok) return ok;
             result.kept = result.kept && excess_px <= promised_px;
             result.source_excess_px = std::max(result.source_excess_px, excess_px);
         }
-        const CrackReport cracks = count_cracks(d, draws, drawn_mesh(d, patterns, draws, arena));
+        const CrackReport cracks = count_cracks(d, draws, drawn_mesh(d, patterns, draws, arena, scene.meshes()));
         result.cracks.edges += cracks.edges;
         result.cracks.open_edges += cracks.open_edges;
         result.cracks.t_junctions += cracks.t_junctions;

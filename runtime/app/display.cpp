@@ -64,6 +64,7 @@ void Display::warm_up(const Camera& camera, const DrawItem& tile, std::int64_t t
     DrawItem whole = tile;
     whole.geomip = 0;
     whole.edge_mask = 0;
+    whole.mesh = {};
     const auto each = static_cast<std::int64_t>(pattern_triangles(o.lattice.tile_cells_log2, 0, 0));
     const std::int64_t count = std::clamp<std::int64_t>(triangles / each, 1, o.max_draws);
     draw(camera, DrawList(static_cast<std::size_t>(count), whole), 0);

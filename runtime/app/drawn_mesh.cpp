@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <bit>
+#include <cassert>
 #include <cmath>
 #include <cstring>
+#include <span>
 #include <unordered_set>
 
 #include "common/mesh/morphed_vertex.h"
@@ -49,9 +51,21 @@ bool inside(const Edge& e, const LatticeVertex& v) {
     return along > 0 && along < length;
 }
 
+// Of the whole tile, or of the mesh that it is drawn by.
+std::span<const std::uint32_t> drawn_indices(const DrawItem& item, const TilePatterns& patterns,
+                                             const MeshPool* meshes) {
+    if (item.mesh.count > 0) {
+        assert(meshes != nullptr);
+        return meshes->indices(item.mesh);
+    }
+    const PatternRange range = patterns.range(item.geomip, item.edge_mask);
+    return std::span(patterns.indices()).subspan(range.first, range.count);
+}
+
 }  // namespace
 
-DrawnMesh drawn_mesh(const Dataset& d, const TilePatterns& patterns, const DrawList& draws, const CpuArena& arena) {
+DrawnMesh drawn_mesh(const Dataset& d, const TilePatterns& patterns, const DrawList& draws, const CpuArena& arena,
+                     const MeshPool* meshes) {
     DrawnMesh mesh;
     const auto pitch = static_cast<std::uint32_t>(d.lattice.tile_samples());
     for (const DrawItem& item : draws) {
@@ -60,9 +74,7 @@ DrawnMesh drawn_mesh(const Dataset& d, const TilePatterns& patterns, const DrawL
         const LatticePoint corner = d.lattice.corner(item.tile);
         const std::int64_t step = d.lattice.step(item.tile.level);
         const float side_m = static_cast<float>(step) * static_cast<float>(d.lattice.spacing_m);
-        const PatternRange range = patterns.range(item.geomip, item.edge_mask);
-        for (std::uint32_t k = range.first; k < range.first + range.count; ++k) {
-            const std::uint32_t index = patterns.indices()[k];
+        for (const std::uint32_t index : drawn_indices(item, patterns, meshes)) {
             const VertexMorph morph = vertex_morph(static_cast<int>(index % pitch), static_cast<int>(index / pitch),
                                                    d.lattice.tile_cells_log2, pattern);
             mesh.corners.push_back({static_cast<std::int32_t>(corner.i + index % pitch * step),

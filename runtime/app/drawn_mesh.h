@@ -26,8 +26,9 @@ struct DrawnMesh {
     std::vector<LatticeVertex> corners;  ///< three a triangle, counter-clockwise from above
 };
 
-DrawnMesh drawn_mesh(const Dataset& dataset, const TilePatterns& patterns, const DrawList& draws,
-                     const CpuArena& arena);
+/// `meshes`: the pool that the items' meshes are held in; null where no item has one.
+DrawnMesh drawn_mesh(const Dataset& dataset, const TilePatterns& patterns, const DrawList& draws, const CpuArena& arena,
+                     const MeshPool* meshes = nullptr);
 
 struct CrackReport {
     std::int64_t edges = 0;        ///< sides of triangles, each triangle's three

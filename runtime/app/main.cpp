@@ -1,4 +1,5 @@
-// scree-view: the runtime program. `scree-view STORE` opens the window; shot, fly and audit are commands.
+// scree-view: the runtime program. `scree-view STORE` opens the window, as `scree-view view STORE` does; shot, fly,
+// audit and compare are commands.
 #include <fmt/format.h>
 
 #include <array>
@@ -6,6 +7,7 @@
 #include <new>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "common/cli/completion.h"
 #include "common/report.h"
@@ -18,16 +20,22 @@ struct Command {
     int (*run)(int, char**);
 };
 
-constexpr std::array<Command, 3> kCommands{
-    {{"shot", scree::run_shot}, {"fly", scree::run_fly}, {"audit", scree::run_audit}}};
+constexpr std::array<Command, 5> kCommands{{{"view", scree::run_view},
+                                            {"shot", scree::run_shot},
+                                            {"fly", scree::run_fly},
+                                            {"audit", scree::run_audit},
+                                            {"compare", scree::run_compare}}};
 
 // For the build, which installs what this prints.
 int print_completion() {
-    fmt::print("{}", scree::completion_head("scree-view", {"shot", "fly", "audit"}, true));
+    std::vector<std::string> words;
+    for (const Command& c : kCommands) words.emplace_back(c.name);
+    fmt::print("{}", scree::completion_head("scree-view", words, true));
     std::string name = "scree-view", flag = "--completion-case";
     std::array<char*, 3> arguments{name.data(), flag.data(), nullptr};
-    for (const Command& c : kCommands) c.run(2, arguments.data());
-    scree::run_view(2, arguments.data());
+    for (const Command& c : kCommands)
+        if (c.run != scree::run_view) c.run(2, arguments.data());
+    scree::run_view(2, arguments.data());  // all others
     fmt::print("{}", scree::completion_tail("scree-view"));
     return 0;
 }

@@ -54,7 +54,7 @@ Result<void> shoot(const ViewOptions& o, const std::optional<FlightPose>& asked,
     if (!mesh_file.empty()) {
         const Dataset& d = (*scene)->dataset();
         const TilePatterns patterns(d.lattice.tile_cells_log2);
-        const DrawnMesh mesh = drawn_mesh(d, patterns, selection.draws[0], *(*display)->arena());
+        const DrawnMesh mesh = drawn_mesh(d, patterns, selection.draws[0], *(*display)->arena(), (*scene)->meshes());
         if (auto ok = write_ply(mesh_file, d, mesh, camera->eye, frame->half_curvature); !ok) return ok;
     }
     if (o.json != "-")

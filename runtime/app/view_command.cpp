@@ -198,7 +198,8 @@ int run_view(int argc, char** argv) {
     app.add_option("--tau-max", w.tau_most_px, "With --fps: never coarser than this")->capture_default_str();
     app.add_option("--seconds", w.seconds, "Close after so long; 0: stay open")->capture_default_str();
     app.set_version_flag("--version", std::string("scree-view ") + SCREE_VERSION);
-    if (const int code = parse_arguments(app, argc, argv, {"scree-view-audit", "scree-view-fly", "scree-view-shot"});
+    if (const int code = parse_arguments(
+            app, argc, argv, {"scree-view-audit", "scree-view-compare", "scree-view-fly", "scree-view-shot"});
         code >= 0)
         return code;
     if (auto ok = check_view_options(o); !ok) return report_error("scree-view", ok.error());

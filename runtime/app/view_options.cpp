@@ -24,7 +24,32 @@ void add_view_options(CLI::App& app, ViewOptions& o) {
         ->type_name("auto|on|off")
         ->capture_default_str();
     app.add_flag("--no-morph", o.no_morph, "Draw discrete levels: nothing moves, changes pop");
+    add_lod_options(app, o.lod_options);
     add_json_option(app, o.json);
+}
+
+void add_lod_options(CLI::App& app, LodOptions& o) {
+    app.add_option("--lod", o.lod, "What decides density: geomip (a stride a tile), rsg (vertex by vertex), block-rsg")
+        ->type_name("geomip|rsg|block-rsg")
+        ->capture_default_str();
+    app.add_option(
+           "--metric", o.metric,
+           "guaranteed (nothing errs by more than tau), or as the papers have it and without a bound: uc, deboer")
+        ->type_name("guaranteed|uc|deboer")
+        ->capture_default_str();
+    app.add_option(
+           "--cache", o.cache,
+           "With --lod rsg, keep meshes while the eye moves: off, exact (errs by up to tau + s), paper (no bound)")
+        ->type_name("off|exact|paper")
+        ->capture_default_str();
+    app.add_option("--s", o.s_px, "With --cache, pixels beyond tau: larger keeps meshes longer, and errs by more")
+        ->capture_default_str();
+    app.add_option("--cull", o.cull, "box, or corners (as published: loses tiles)")
+        ->type_name("box|corners")
+        ->capture_default_str();
+    app.add_option("--cracks", o.cracks, "stitch, or with --lod rsg dike (as published: strips between blocks)")
+        ->type_name("stitch|dike")
+        ->capture_default_str();
 }
 
 Result<void> check_view_options(ViewOptions& o) {
@@ -44,6 +69,9 @@ Result<void> check_view_options(ViewOptions& o) {
     if (!curvature)
         return Error{ErrorCode::usage, fmt::format("--curvature {} is not auto, on or off", o.curvature_text)};
     o.curvature = *curvature;
+    const auto lod = lod_settings_from(o.lod_options);
+    if (!lod) return lod.error();
+    o.lod = *lod;
     if (!(o.fov_deg >= 0.001 && o.fov_deg <= 179))
         return Error{ErrorCode::usage, fmt::format("--fov {} is outside 0.001..179 degrees", o.fov_deg)};
     return {};
@@ -55,6 +83,7 @@ SceneOptions scene_options(const ViewOptions& o) {
     s.tau_px = o.tau_px;
     s.texture_tau_px = o.texture_tau_px;
     s.curvature = o.curvature;
+    s.lod = o.lod;
     s.morph = !o.no_morph;
     return s;
 }

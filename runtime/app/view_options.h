@@ -21,15 +21,19 @@ struct ViewOptions {
     std::string budget = "256M";
     std::string curvature_text = "auto";
     bool no_morph = false;
+    LodOptions lod_options;
     std::optional<std::string> path;
     std::string json;
 
     int width_px = 800, height_px = 800;
     std::int64_t budget_bytes = 0;
     Curvature curvature = Curvature::automatic;
+    LodSettings lod;
 };
 
 void add_view_options(CLI::App& app, ViewOptions& options);
+/// --lod, --metric, --cache, --s, --cull, --cracks: part of the above.
+void add_lod_options(CLI::App& app, LodOptions& options);
 /// Parses sizes; checks ranges. Errors: ErrorCode::usage.
 Result<void> check_view_options(ViewOptions& options);
 /// The scene as the options want it.

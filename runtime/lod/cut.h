@@ -18,6 +18,7 @@
 
 #include "common/dataset.h"
 #include "runtime/lod/level.h"
+#include "runtime/lod/lod_method.h"
 #include "runtime/paging/residency.h"
 #include "runtime/view/camera.h"
 #include "runtime/view/frustum.h"
@@ -69,7 +70,8 @@ struct alignas(64) CutNode {
     std::uint32_t inside = 0;                  ///< views that see all of its box
     TileId id;
     const HeightBounds* bounds = nullptr;
-    double metres_per_px = 0;        ///< least over the views that see it of d / (f K): error allowed for one pixel
+    double metres_per_px = 0;        ///< least over the views that see it of d / (f K): error allowed for one pixel; of
+                                     ///< de Boer's metric d is the distance to its centre, and K 1
     double texel_per_px = 0;         ///< least over the views of d / f: metres of texture a pixel covers
     double west_m = 0, north_m = 0;  ///< its north-west corner
     double finest_error_m = 0;       ///< of its own densest mesh, thinned edges included
@@ -89,6 +91,7 @@ struct CutSettings {
     /// Seconds in which a page that came late grows out of its parent's shape by one level; 0: at once.
     double growth_s = 0;
     double moved_m = 0;  ///< by the eye from frame to frame: what moves across the screen so hides its growth
+    ErrorMetric metric = ErrorMetric::guaranteed;  ///< or deboer
 };
 
 /// A box as it is seen over a curved earth: lowered by the least and the greatest drop within it.
@@ -131,6 +134,10 @@ public:
     Drawn drawn(std::int32_t leaf);
     /// Greatest error of a leaf drawn so, metres.
     double drawn_error_m(const CutNode& leaf, const Drawn& drawn) const;
+    /// node.metres_per_px of the guaranteed metric, whichever the cut was made by.
+    double certain_metres_per_px(const CutNode& node) const;
+    /// One of its four corners is in the frustum, taken half-way between its lowest and highest heights (Ke et al.).
+    bool corner_in_view(const CutNode& node, const LodView& view) const;
 
 private:
     std::int32_t neighbour(std::int32_t node, int direction);
@@ -151,8 +158,11 @@ private:
     std::int32_t add_node(TileId id, const Known& known, std::int32_t parent);
     void measure(CutNode& node, std::uint32_t candidates, std::uint32_t inside) const;
     void judge(CutNode& node, double parent_error_m) const;
+    void judge_by_corrections(CutNode& node) const;
     void judge_texture(CutNode& node) const;
     double error_m(const CutNode& node, int geomip) const;
+    double correction_m(const CutNode& node, int geomip) const;
+    double correction_below_n(const CutNode& node) const;
     void add_roots();
     void consider_from(std::size_t first);
     bool try_split(std::int32_t node);

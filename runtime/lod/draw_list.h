@@ -8,6 +8,7 @@
 
 #include "common/mesh/tile_patterns.h"
 #include "common/tile_id.h"
+#include "runtime/lod/mesh_pool.h"
 
 namespace scree {
 
@@ -40,6 +41,10 @@ struct DrawItem {
     std::int32_t geomip = 0;      ///< stride 2^geomip of the tile's own samples
     std::uint32_t edge_mask = 0;  ///< EdgeMask: edges thinned by 2
     TilePart part;                ///< what of the tile this item draws
+    /// Triangles made for this item, in the frame's MeshPool: those of `part` alone. Empty: the pattern of geomip and
+    /// edge_mask. With a mesh those still say what strides the tile is drawn with, and nothing morphs: all weights are
+    /// 0.
+    MeshRange mesh;
 
     /// Geomorph (docs/lod-and-paging.md, "Morphing"): how far vertices have moved from their own height (0) to their
     /// height on the next coarser surface (1). Inner vertices born at the stride drawn move by `morph`; those of an

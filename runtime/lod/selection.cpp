@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cassert>
 #include <cmath>
 #include <limits>
@@ -80,7 +81,9 @@ struct Selector::Impl {
                 s.height_slots,
                 false,
                 s.half_curvature,
-                0};
+                0,
+                0,
+                s.metric};
     }
 
     // Roots are always planned. Where every tile of the store has its slot nothing can be too large.
@@ -159,6 +162,8 @@ struct Selector::Impl {
         for (std::size_t k = 0; k < nodes.size(); ++k) {
             const CutNode& node = nodes[k];
             if (node.split || !node.visible()) continue;
+            const std::uint32_t shown = shown_in(cut, node, settings.culling);
+            if (shown == 0) continue;
             Cut::Drawn drawn = cut.drawn(static_cast<std::int32_t>(k));
             if (!settings.morph) {
                 drawn.morph = 0;
@@ -173,14 +178,14 @@ struct Selector::Impl {
             item.edge_morph = drawn.edge_morph;
             textures.place(cut, static_cast<std::int32_t>(k), settings.growth_s, item);
             ++result.nodes;
-            const double bound_px = cut.drawn_error_m(node, drawn) / node.metres_per_px;
+            const double bound_px = cut.drawn_error_m(node, drawn) / cut.certain_metres_per_px(node);
             result.max_bound_px = std::max(result.max_bound_px, bound_px);
             const double weight = screen_share(node);
             result.mean_bound_px += weight * bound_px;
             weights += weight;
             const std::uint32_t triangles = pattern_triangles(n, item.geomip, item.edge_mask);
             for (std::size_t v = 0; v < views.size(); ++v) {
-                if ((node.seen_by >> v & 1) == 0) continue;
+                if ((shown >> v & 1) == 0) continue;
                 result.draws[v].push_back(item);
                 if (!result.parts.empty())
                     textures.emit_parts(cut, static_cast<std::int32_t>(k), item, result.parts[v]);
@@ -189,6 +194,17 @@ struct Selector::Impl {
         }
         if (weights > 0) result.mean_bound_px /= weights;
         result.growing = cut.growing() || textures.fading();
+    }
+
+    // The views that draw a tile. Only tiles that are to be drawn are culled by corners: of a large page none may be in
+    // view though all of its middle is, and the whole terrain would be lost with a root.
+    std::uint32_t shown_in(const Cut& cut, const CutNode& node, Culling culling) {
+        if (culling == Culling::box) return node.seen_by;
+        std::uint32_t shown = node.seen_by;
+        for (std::size_t v = 0; v < views.size(); ++v)
+            if ((shown >> v & 1) != 0 && !cut.corner_in_view(node, views[v])) shown &= ~(1u << v);
+        result.culled += std::popcount(node.seen_by & ~shown);
+        return shown;
     }
 
     // At most so many pixels of the screen, by its nearest point.
@@ -210,7 +226,7 @@ struct Selector::Impl {
         r.max_bound_px = r.mean_bound_px = 0;
         r.complete = true;
         r.growing = r.budget_limited = false;
-        r.triangles = r.nodes = r.refine_steps = 0;
+        r.triangles = r.nodes = r.culled = r.refine_steps = 0;
     }
 
     void select(const SelectionSettings& settings, const Residency& residency) {
@@ -247,8 +263,8 @@ Selector::Selector(const Dataset& dataset) : impl_(std::make_unique<Impl>(datase
 Selector::~Selector() = default;
 Selector::Selector(Selector&&) noexcept = default;
 
-const Selection& Selector::select(std::span<const Camera> cameras, const SelectionSettings& settings,
-                                  const Residency& residency) {
+Selection& Selector::select(std::span<const Camera> cameras, const SelectionSettings& settings,
+                            const Residency& residency) {
     assert(cameras.size() <= kMaxViews);
     Impl& s = *impl_;
     s.clear(cameras.size());

@@ -14,6 +14,7 @@
 
 #include "common/dataset.h"
 #include "runtime/lod/draw_list.h"
+#include "runtime/lod/lod_method.h"
 #include "runtime/paging/residency.h"
 #include "runtime/paging/tile_request.h"
 #include "runtime/view/camera.h"
@@ -34,6 +35,11 @@ struct SelectionSettings {
     double growth_s = 0;
     /// Metres that the eye has come from frame to frame lately: what races by need not grow.
     double moved_m = 0;
+    /// deboer: pages and levels go by the distance to a tile's centre, no off-axis factor, and corrections from level
+    /// to level; what is drawn is as whole as ever, and only the promise is gone. Needs Residency's corrections, or
+    /// goes by what headers say of them. Anything else: guaranteed.
+    ErrorMetric metric = ErrorMetric::guaranteed;
+    Culling culling = Culling::box;  ///< corners: of the tiles to draw, those without a corner in view are left out
 
     friend bool operator==(const SelectionSettings&, const SelectionSettings&) = default;
 };
@@ -47,7 +53,9 @@ struct Selection {
     std::vector<std::int32_t> planned_heights, planned_textures;
     /// Slots of tiles drawn or needed by what is drawn, planned or not: evict last.
     std::vector<std::int32_t> standing_heights, standing_textures;
-    double max_bound_px = 0;      ///< the promise: no drawn point is further from the finest surface on screen
+    /// No drawn point is further from the finest surface on screen: the promise where the metric is the guaranteed one,
+    /// and true of any.
+    double max_bound_px = 0;
     double mean_bound_px = 0;     ///< over the tiles drawn, weighted by the share of the screen they may cover
     double tau_effective_px = 0;  ///< the tolerance that the slots allow: settings.tau_px unless they bind
     double texture_tau_effective_px = 0;
@@ -56,6 +64,7 @@ struct Selection {
     bool budget_limited = false;  ///< slots bound before tau did
     std::int64_t triangles = 0;   ///< over all views
     std::int64_t nodes = 0;       ///< drawn in any view
+    std::int64_t culled = 0;      ///< tiles left out by Culling::corners though their box is in view, over all views
     std::int64_t refine_steps = 0;
 
     const DrawList& to_render(std::size_t view) const { return parts.empty() ? draws[view] : parts[view]; }
@@ -69,8 +78,7 @@ public:
 
     /// The result is valid until the next call. A root that is not resident is taken for one that is not stored: the
     /// pager pins them. At most kMaxViews views.
-    const Selection& select(std::span<const Camera> views, const SelectionSettings& settings,
-                            const Residency& residency);
+    Selection& select(std::span<const Camera> views, const SelectionSettings& settings, const Residency& residency);
 
 private:
     struct Impl;

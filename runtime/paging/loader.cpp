@@ -37,8 +37,9 @@ bool more_urgent(const LoadJob& a, const LoadJob& b) {
 // What one thread reads and decodes with.
 class TileLoading {
 public:
-    TileLoading(std::shared_ptr<const TileStore> store, std::unique_ptr<TileReader> reader)
-        : store_(std::move(store)), reader_(std::move(reader)) {}
+    TileLoading(std::shared_ptr<const TileStore> store, std::unique_ptr<TileReader> reader,
+                std::shared_ptr<const TileMeasure> measure)
+        : store_(std::move(store)), reader_(std::move(reader)), measure_(std::move(measure)) {}
 
     void load(LoadedTile& tile) {
         tile.error.clear();
@@ -74,6 +75,10 @@ private:
         tile.header = height_.header;
         tile.vertices.resize(slot_vertex_count(n));
         fill_vertex_slot(height_.samples, n, tile.vertices);
+        if (measure_ != nullptr) {
+            tile.costs.resize(tile.vertices.size());
+            measure_->measure(dataset(), tile.job.id, tile.header, tile.vertices, tile.costs);
+        }
         return {};
     }
 
@@ -88,6 +93,7 @@ private:
 
     std::shared_ptr<const TileStore> store_;
     std::unique_ptr<TileReader> reader_;
+    std::shared_ptr<const TileMeasure> measure_;
     TileRow row_;
     HeightTile height_;
     TextureTile texture_;
@@ -97,6 +103,7 @@ private:
 
 struct Loader::Impl {
     int latency_ms = 0;
+    std::shared_ptr<const TileMeasure> measure;
     mutable std::mutex mutex;
     std::condition_variable work_ready, tile_ready, stop;
     std::vector<LoadJob> queue;  // least urgent first: jobs leave at the back
@@ -169,15 +176,17 @@ struct Loader::Impl {
 
 Loader::Loader(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
-Result<std::unique_ptr<Loader>> Loader::start(std::shared_ptr<const TileStore> store, int threads, int latency_ms) {
+Result<std::unique_ptr<Loader>> Loader::start(std::shared_ptr<const TileStore> store, int threads, int latency_ms,
+                                              std::shared_ptr<const TileMeasure> measure) {
     auto impl = std::make_unique<Impl>();
     impl->latency_ms = latency_ms;
+    impl->measure = measure;
     std::unique_ptr<Loader> loader(new Loader(std::move(impl)));
     for (int t = 0; t < std::max(threads, 1); ++t) {
         auto reader = store->open_reader();
         if (!reader) return reader.error();
         loader->impl_->threads.emplace_back(
-            [state = loader->impl_.get(), loading = TileLoading(store, std::move(*reader))]() mutable {
+            [state = loader->impl_.get(), loading = TileLoading(store, std::move(*reader), measure)]() mutable {
                 state->run(std::move(loading));
             });
     }
@@ -196,7 +205,7 @@ Loader::~Loader() {
 
 void Loader::renew(std::shared_ptr<const TileStore> store, Readers readers) {
     std::vector<TileLoading> fresh, unused;
-    for (auto& reader : readers) fresh.emplace_back(store, std::move(reader));
+    for (auto& reader : readers) fresh.emplace_back(store, std::move(reader), impl_->measure);
     const std::lock_guard lock(impl_->mutex);
     assert(fresh.size() >= impl_->threads.size());
     impl_->queue.clear();

@@ -12,6 +12,7 @@
 
 #include "common/mesh/vertex_slot.h"
 #include "common/store/tile_store.h"
+#include "runtime/paging/tile_measure.h"
 
 namespace scree {
 
@@ -33,6 +34,7 @@ struct LoadedTile {
     bool stale = false;    ///< the store was rewritten meanwhile: neither the tile nor its error means anything
     HeightTileHeader header;
     std::vector<SlotVertex> vertices;  ///< height tiles
+    std::vector<VertexCost> costs;     ///< height tiles, where there is a measure
     std::vector<std::uint8_t> blocks;  ///< texture tiles, mip chain coarsest first
     std::int64_t bytes_read = 0;       ///< payload as stored
 };
@@ -47,7 +49,9 @@ struct LoaderCounters {
 class Loader {
 public:
     /// Errors: those of TileStore::open_reader. `latency_ms` delays every read (to test slow disks).
-    static Result<std::unique_ptr<Loader>> start(std::shared_ptr<const TileStore> store, int threads, int latency_ms);
+    /// `measure`, where there is one, is asked about every height tile.
+    static Result<std::unique_ptr<Loader>> start(std::shared_ptr<const TileStore> store, int threads, int latency_ms,
+                                                 std::shared_ptr<const TileMeasure> measure = {});
     /// `store` outlives the loader.
     static Result<std::unique_ptr<Loader>> start(const TileStore& store, int threads, int latency_ms) {
         return start(std::shared_ptr<const TileStore>(std::shared_ptr<void>(), &store), threads, latency_ms);

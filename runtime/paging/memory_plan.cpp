@@ -37,9 +37,10 @@ std::int64_t fixed_cost(const Dataset& d, int loader_threads) {
     return kFixedBytes + std::max(loader_threads, 1) * loader_thread_bytes(d);
 }
 
-Result<MemoryPlan> plan_memory(const Dataset& d, std::int64_t budget_bytes, int loader_threads) {
-    const std::int64_t height = height_slot_cost(d), texture = texture_slot_cost(d);
-    const std::int64_t fixed = fixed_cost(d, loader_threads);
+Result<MemoryPlan> plan_memory(const Dataset& d, std::int64_t budget_bytes, int loader_threads,
+                               const MoreMemory& more) {
+    const std::int64_t height = height_slot_cost(d) + more.per_height_slot, texture = texture_slot_cost(d);
+    const std::int64_t fixed = fixed_cost(d, loader_threads) + more.fixed;
     const std::int64_t roots = d.lattice.root_rows * d.lattice.root_columns;
     const std::int64_t staged = height + texture + 2 * kStagedBytes;
     MemoryPlan plan;
@@ -69,10 +70,10 @@ Result<MemoryPlan> plan_memory(const Dataset& d, std::int64_t budget_bytes, int 
         // Nothing is short: up to as much again, so that an update comes in beside what is drawn, and may add tiles.
         const auto spare = static_cast<double>(free - plan.height_slots * height - plan.texture_slots * texture);
         const auto heights = static_cast<double>(d.height_tiles), textures = static_cast<double>(d.texture_tiles);
-        const double more =
+        const double spare_share =
             std::min(1.0, spare / (heights * static_cast<double>(height) + textures * static_cast<double>(texture)));
-        plan.height_slots += static_cast<std::int64_t>(more * heights);
-        plan.texture_slots += static_cast<std::int64_t>(more * textures);
+        plan.height_slots += static_cast<std::int64_t>(spare_share * heights);
+        plan.texture_slots += static_cast<std::int64_t>(spare_share * textures);
     }
     plan.resident_bytes = fixed + staging + plan.height_slots * height + plan.texture_slots * texture;
     return plan;

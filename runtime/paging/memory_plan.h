@@ -17,6 +17,12 @@ struct MemoryPlan {
     std::int64_t resident_bytes = 0;
 };
 
+/// Bytes that a method of level of detail takes besides.
+struct MoreMemory {
+    std::int64_t per_height_slot = 0;
+    std::int64_t fixed = 0;
+};
+
 /// Bytes of one tile of each kind with its bookkeeping.
 std::int64_t height_slot_cost(const Dataset& dataset);
 std::int64_t texture_slot_cost(const Dataset& dataset);
@@ -25,6 +31,8 @@ std::int64_t fixed_cost(const Dataset& dataset, int loader_threads);
 
 /// Errors: ErrorCode::usage when the pinned roots would take more than an eighth of the budget; names the budget
 /// needed.
-Result<MemoryPlan> plan_memory(const Dataset& dataset, std::int64_t budget_bytes, int loader_threads = 2);
+/// `more`: what else is kept.
+Result<MemoryPlan> plan_memory(const Dataset& dataset, std::int64_t budget_bytes, int loader_threads = 2,
+                               const MoreMemory& more = {});
 
 }  // namespace scree

@@ -30,6 +30,7 @@ Pager::Tables::Tables(const PagerOptions& options, const Lattice& lattice, TileC
     : heights(options.memory.height_slots, lattice, residency.heights, slots),
       textures(options.textures ? options.memory.texture_slots : 0, lattice, residency.textures, slots) {
     residency.has_textures = options.textures;
+    if (options.corrections) residency.heights.corrections.resize(static_cast<std::size_t>(heights.capacity()));
 }
 
 bool Pager::Tables::adds_up() const {
@@ -52,7 +53,7 @@ Pager::Pager(std::shared_ptr<const TileStore> store, const PagerOptions& options
 Result<std::unique_ptr<Pager>> Pager::create(std::shared_ptr<const TileStore> store, const PagerOptions& options,
                                              TileSink& sink) {
     std::unique_ptr<Pager> pager(new Pager(store, options, sink));
-    auto loader = Loader::start(store, options.loader_threads, options.latency_ms);
+    auto loader = Loader::start(store, options.loader_threads, options.latency_ms, options.measure);
     if (!loader) return loader.error();
     pager->loader_ = std::move(*loader);
     Loader::QueueEdit(*pager->loader_).jobs().reserve(2 * static_cast<std::size_t>(options.memory.staging_slots));
@@ -109,11 +110,17 @@ Result<std::vector<TileId>> Pager::load_roots(TileKind kind, std::span<const Til
 }
 
 void Pager::put(const LoadedTile& tile, double arrived_s) {
-    if (tile.job.kind == TileKind::height)
+    if (tile.job.kind == TileKind::height) {
         sink_.put_height(tile.job.slot, tile.vertices);
-    else
+        if (options_.measure) sink_.put_costs(tile.job.slot, tile.vertices, tile.costs);
+    } else {
         sink_.put_texture(tile.job.slot, tile.blocks);
-    cache(tile.job.kind).complete(tile.job.slot, tile.header, arrived_s);
+    }
+    Tables& tables = loaded();
+    tables.of(tile.job.kind).complete(tile.job.slot, tile.header, arrived_s);
+    if (tile.job.kind == TileKind::height && options_.corrections)
+        tables.residency.heights.corrections[static_cast<std::size_t>(tile.job.slot)] =
+            level_corrections(tile.vertices, store_->dataset().lattice.tile_cells_log2);
 }
 
 void Pager::report_damage(const LoadedTile& tile) {

@@ -29,6 +29,10 @@ struct PagerOptions {
     int loader_threads = 2;
     int latency_ms = 0;    ///< every read is delayed by this: to try slow disks
     bool textures = true;  ///< false: heights alone (audit)
+    /// Where there is one, the sink gets what it finds out about every height tile.
+    std::shared_ptr<const TileMeasure> measure{};
+    /// Residency keeps the level corrections of height tiles; each height slot takes corrections_cost() more.
+    bool corrections = false;
 };
 
 struct PagerCounters {
@@ -55,6 +59,9 @@ public:
     /// Errors besides: ErrorCode::io where the store was changed meanwhile.
     static Result<std::unique_ptr<Pager>> create(std::shared_ptr<const TileStore> store, const PagerOptions& options,
                                                  TileSink& sink);
+
+    /// Bytes a height slot: tables of two states of the store.
+    static constexpr std::int64_t corrections_cost() { return 2 * sizeof(LevelCorrections); }
 
     const Residency& residency() const { return shown_->residency; }
     /// What arrives from now on has come at `now_s`. Seconds from any start; never goes back.

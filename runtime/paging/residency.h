@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/height_tile.h"
+#include "common/mesh/level_corrections.h"
 #include "common/store/tile_store.h"
 
 namespace scree {
@@ -22,7 +23,9 @@ struct ResidentPages {
     std::vector<HeightTileHeader> headers;              ///< of a texture tile only child_mask
     std::vector<std::array<std::int32_t, 4>> children;  ///< slot of each child quadrant, kNotResident or kUnavailable
     std::vector<double> arrived_s;                      ///< Residency::now_s when the tile became resident
-    std::vector<std::int32_t> roots;                    ///< row-major over the roots; kNotResident: not stored
+    /// Of height tiles, in quanta, where the owner was asked to keep them (ErrorMetric::deboer); else empty.
+    std::vector<LevelCorrections> corrections;
+    std::vector<std::int32_t> roots;  ///< row-major over the roots; kNotResident: not stored
 };
 
 struct Residency {

@@ -36,8 +36,9 @@ bool DrawBatches::reaches_border(const DrawItem& item) const {
 }
 
 // Whether the border blocks, 2 vertices' distances wide, hold all of the item's pixels within half a texel of its
-// border, or within half a texel of the next mip.
+// border, or within half a texel of the next mip. A mesh has no blocks to tell apart.
 bool DrawBatches::has_ring(const DrawItem& item) const {
+    if (item.mesh.count > 0) return false;
     const int blocks_log2 = options_.tile_cells_log2 - item.geomip - 1;
     if (item.part.level != 0 || item.texture.scale > 1 || blocks_log2 < 2) return false;
     const float texels = item.texture.scale * static_cast<float>(1 << options_.texture_size_log2);

@@ -1,9 +1,9 @@
 // DrawBatches: what is drawn of each item, and which draws go into one multi-draw, that is share program and textures.
 //
 // Filtering across texture borders costs pixels more, and only those near a border need it. So an item is drawn as its
-// inner blocks, plain or faded, and its ring of border blocks, blended. Textures lie in several arrays, and on software
-// OpenGL a pixel pays for each array that its program may look at: draws are sorted by the arrays they need. No OpenGL
-// here.
+// inner blocks, plain or faded, and its ring of border blocks, blended; a mesh that reaches a border is blended whole.
+// Textures lie in several arrays, and on software OpenGL a pixel pays for each array that its program may look at:
+// draws are sorted by the arrays they need. No OpenGL here.
 #pragma once
 
 #include <array>

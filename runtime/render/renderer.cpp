@@ -12,9 +12,9 @@
 #include <utility>
 #include <vector>
 
-#include "common/mesh/tile_patterns.h"
 #include "runtime/render/draw_batches.h"
 #include "runtime/render/draw_stream.h"
+#include "runtime/render/index_arena.h"
 #include "runtime/render/program.h"
 #include "runtime/render/shader_constants.h"
 #include "runtime/render/texture_arena.h"
@@ -35,77 +35,6 @@ using Clock = std::chrono::steady_clock;
 
 double ms_since(Clock::time_point start) {
     return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
-
-/// Where the shapes of an item's draws lie in the index arena: its blocks, or only those at the tile's border, or only
-/// the others.
-class DrawPatterns {
-public:
-    explicit DrawPatterns(int tile_cells_log2);
-    PatternRange range(const DrawItem& item, DrawShape shape) const {
-        if (shape == DrawShape::whole) return patterns_.range(item.geomip, item.edge_mask, item.part);
-        const auto geomip = static_cast<std::size_t>(item.geomip);
-        return shape == DrawShape::inner ? inner_[geomip] : rings_[geomip * kEdgeMaskCount + item.edge_mask];
-    }
-    const std::vector<std::uint32_t>& indices() const { return indices_; }
-
-private:
-    /// Appends the blocks that lie at the tile's border, or the others.
-    PatternRange append_blocks(int geomip, unsigned mask, bool at_border);
-
-    TilePatterns patterns_;
-    std::vector<std::uint32_t> indices_;  ///< the patterns', then those of inner blocks and rings
-    std::vector<PatternRange> inner_;     ///< [geomip]: no edge to thin
-    std::vector<PatternRange> rings_;     ///< [geomip][edge mask]
-};
-
-DrawPatterns::DrawPatterns(int tile_cells_log2) : patterns_(tile_cells_log2), indices_(patterns_.indices()) {
-    for (int geomip = 0; geomip < patterns_.geomip_levels(); ++geomip) {
-        inner_.push_back(append_blocks(geomip, 0, false));
-        for (unsigned mask = 0; mask < kEdgeMaskCount; ++mask) rings_.push_back(append_blocks(geomip, mask, true));
-    }
-}
-
-PatternRange DrawPatterns::append_blocks(int geomip, unsigned mask, bool at_border) {
-    const int level = patterns_.finest_part_level(geomip), last = (1 << level) - 1;
-    const auto first = static_cast<std::uint32_t>(indices_.size());
-    for (int y = 0; y <= last; ++y)
-        for (int x = 0; x <= last; ++x) {
-            if ((x == 0 || y == 0 || x == last || y == last) != at_border) continue;
-            const PatternRange block = patterns_.range(geomip, mask, {level, x, y});
-            const auto from = patterns_.indices().begin() + block.first;
-            indices_.insert(indices_.end(), from, from + block.count);
-        }
-    return {first, static_cast<std::uint32_t>(indices_.size()) - first};
-}
-
-/// All indices in one buffer. They are local to a tile, so 16 bits serve up to m = 128.
-struct IndexArena {
-    BufferHandle buffer;
-    DrawPatterns patterns{1};
-    GLenum type = GL_UNSIGNED_SHORT;
-};
-
-IndexArena make_index_arena(int tile_cells_log2) {
-    IndexArena arena{{}, DrawPatterns(tile_cells_log2)};
-    const std::vector<std::uint32_t>& all = arena.patterns.indices();
-    GLuint name = 0;
-    glCreateBuffers(1, &name);
-    arena.buffer = BufferHandle(name);
-    const auto store = [&](const auto& indices) {
-        glNamedBufferStorage(name, static_cast<GLsizeiptr>(indices.size() * sizeof(indices[0])), indices.data(), 0);
-    };
-    const int samples = (1 << tile_cells_log2) + 1;
-    if (samples * samples <= 65535) {
-        std::vector<std::uint16_t> small;
-        small.reserve(all.size());
-        for (const std::uint32_t index : all) small.push_back(static_cast<std::uint16_t>(index));
-        store(small);
-    } else {
-        arena.type = GL_UNSIGNED_INT;
-        store(all);
-    }
-    return arena;
 }
 
 /// Names vertex attributes of one vertex array.
@@ -149,7 +78,7 @@ VertexArrayHandle make_vertex_array(const VertexArena& vertices, const IndexAren
     }
     glVertexArrayBindingDivisor(name, kDrawBinding, 1);
     glVertexArrayVertexBuffer(name, kVertexBinding, vertices.buffer(), 0, sizeof(SlotVertex));
-    glVertexArrayElementBuffer(name, indices.buffer.name());
+    glVertexArrayElementBuffer(name, indices.buffer());
     return VertexArrayHandle(name);
 }
 
@@ -187,7 +116,8 @@ void set_position(GLuint program, const Camera& camera, const RelativeFrame& fra
 
 std::size_t renderer_bytes(const RendererOptions& options) {
     return vertex_arena_bytes(options.lattice.tile_cells_log2, options.height_slots) +
-           texture_arena_bytes(options.texture_size_log2, options.texture_slots);
+           texture_arena_bytes(options.texture_size_log2, options.texture_slots) +
+           mesh_arena_bytes(options.lattice.tile_cells_log2, options.mesh_indices);
 }
 
 struct Renderer::State {
@@ -288,12 +218,12 @@ std::uint64_t Renderer::State::write_draws(std::span<const DrawItem> items, cons
         const SortedDraw& sorted = batches.draws()[draw];
         const DrawItem& item = items[sorted.item];
         const DrawBatch& batch = batches.batches()[sorted.batch];
-        const PatternRange pattern = indices.patterns.range(item, sorted.shape);
+        const IndexRange range = indices.range(item, sorted.shape);
         region.attributes[draw] = attributes_of(item);
-        region.commands[draw] = {pattern.count, 1, pattern.first, item.height_slot * vertices.slot_vertices(),
+        region.commands[draw] = {range.count, 1, range.first, item.height_slot * vertices.slot_vertices(),
                                  static_cast<std::uint32_t>(draw)};
         if (batch.imagery != Imagery::plain) region.blends[draw] = blend_of(item, batch);
-        triangles += pattern.count / 3;
+        triangles += range.count / 3;
     }
     return triangles;
 }
@@ -318,7 +248,7 @@ void Renderer::State::draw_batch(const DrawBatch& batch, const FrameSettings& se
     glBindVertexArray(plain ? plain_array.name() : blended_array.name());
     bind_textures(batch);
     glMultiDrawElementsIndirect(
-        GL_TRIANGLES, indices.type,
+        GL_TRIANGLES, indices.type(),
         reinterpret_cast<const void*>(region.commands_offset + batch.first * sizeof(DrawCommand)),
         static_cast<GLsizei>(batch.count), sizeof(DrawCommand));
 }
@@ -383,14 +313,15 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const RendererOptions& option
     state->batches = DrawBatches({arrays, state->textures.layers_per_array(), state->bound_arrays, tile_cells_log2,
                                   options.texture_size_log2, options.max_draws});
     if (const auto built = state->build_programs(); !built) return built.error();
-    state->indices = make_index_arena(tile_cells_log2);
+    auto indices = IndexArena::create(tile_cells_log2, options.mesh_indices);
+    if (!indices) return indices.error();
+    state->indices = std::move(*indices);
     state->plain_array = make_vertex_array(state->vertices, state->indices, false);
     state->blended_array = make_vertex_array(state->vertices, state->indices, true);
     GLuint empty = 0;
     glCreateVertexArrays(1, &empty);
     state->sky_array = VertexArrayHandle(empty);
-    if (glGetError() != GL_NO_ERROR)
-        return Error{ErrorCode::display, "OpenGL has no memory for the index lists of this tile size"};
+    if (glGetError() != GL_NO_ERROR) return Error{ErrorCode::display, "OpenGL has no memory for its vertex arrays"};
     return std::unique_ptr<Renderer>(new Renderer(std::move(state)));
 }
 
@@ -399,6 +330,10 @@ void Renderer::upload_height(int slot, std::span<const SlotVertex> vertices) {
 }
 
 void Renderer::upload_texture(int slot, std::span<const std::uint8_t> chain) { state_->textures.upload(slot, chain); }
+
+void Renderer::upload_mesh(std::uint32_t first, std::span<const std::uint32_t> indices) {
+    state_->indices.upload_mesh(first, indices);
+}
 
 FrameTimes Renderer::draw(const Camera& camera, std::span<const DrawItem> items, const FrameSettings& settings,
                           RenderTarget& target) {

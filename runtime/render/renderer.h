@@ -29,6 +29,8 @@ struct RendererOptions {
     /// it is taken at once.
     int height_slots = 1;
     int texture_slots = 1;
+    /// Capacity of the frames' MeshPool, 0 without one: mesh_arena_bytes() says what it takes.
+    std::size_t mesh_indices = 0;
     /// Items a frame at most. Each may be two draws, of 120 bytes each, three times.
     int max_draws = 4096;
     /// 1: off; up to 16: sharper imagery at grazing angles; costs 5 to 6 ms at 800x800 on software OpenGL.
@@ -81,6 +83,9 @@ public:
     /// See VertexArena::upload and TextureArena::upload; slots and sizes that do not fit assert.
     void upload_height(int slot, std::span<const SlotVertex> vertices);
     void upload_texture(int slot, std::span<const std::uint8_t> chain);
+    /// Indices of the MeshPool from `first` on, within mesh_indices: whatever MeshPool::written_since() tells, before
+    /// the meshes are drawn. What was drawn before keeps the old ones.
+    void upload_mesh(std::uint32_t first, std::span<const std::uint32_t> indices);
 
     /// Takes state that it does not set (masks, stencil, polygon offset) for OpenGL's initial one.
     /// Clears `target`, draws `items` (slots uploaded before; at most max_draws) and the sky. The camera's size is the

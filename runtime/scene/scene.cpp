@@ -12,6 +12,7 @@
 
 #include "common/process_usage.h"
 #include "common/report.h"
+#include "runtime/lod/page_measure.h"
 #include "runtime/view/frustum.h"
 
 namespace scree {
@@ -49,15 +50,37 @@ bool same_view(const Camera& a, const Camera& b) {
 
 }  // namespace
 
+class Scene::Sink final : public TileSink {
+public:
+    Sink(TileSink& next, Scene& scene) : next_(next), scene_(scene) {}
+    Result<void> renew(const Dataset& dataset, const MemoryPlan& plan) override { return next_.renew(dataset, plan); }
+    void put_height(std::int32_t slot, std::span<const SlotVertex> vertices) override {
+        next_.put_height(slot, vertices);
+    }
+    void put_costs(std::int32_t slot, std::span<const SlotVertex> vertices,
+                   std::span<const VertexCost> costs) override {
+        scene_.mesher_->put(slot, vertices, costs);
+    }
+    void put_texture(std::int32_t slot, std::span<const std::uint8_t> chain) override {
+        next_.put_texture(slot, chain);
+    }
+
+private:
+    TileSink& next_;
+    Scene& scene_;
+};
+
 Scene::Scene(std::shared_ptr<const SqliteStore> store, const SceneOptions& options, const MemoryPlan& memory)
     : store_(std::move(store)), options_(options), memory_(memory), peak_resident_bytes_(memory.resident_bytes) {
     make_selectors();
+    make_mesher();
 }
 
 Scene::~Scene() = default;
 
 Result<std::unique_ptr<Scene>> Scene::open(std::shared_ptr<const SqliteStore> store, const SceneOptions& options) {
-    auto memory = plan_memory(store->dataset(), options.budget_bytes);
+    if (auto ok = expect_built_in(options.lod); !ok) return ok.error();
+    auto memory = plan_of(store->dataset(), options);
     if (!memory) return memory.error();
     return std::unique_ptr<Scene>(new Scene(std::move(store), options, *memory));
 }
@@ -68,6 +91,28 @@ void Scene::make_selectors() {
     ahead_ = std::make_unique<Selector>(dataset());
 }
 
+Result<MemoryPlan> Scene::plan_of(const Dataset& dataset, const SceneOptions& options) {
+    MoreMemory more;
+    if (options.lod.method != LodMethod::geomip)
+        more = {PageMesher::slot_cost(dataset), PageMesher::fixed_cost(dataset)};
+    if (options.lod.metric == ErrorMetric::deboer) more.per_height_slot = Pager::corrections_cost();
+    return plan_memory(dataset, options.budget_bytes, 2, more);
+}
+
+void Scene::make_mesher() {
+    if (options_.lod.method == LodMethod::geomip) return;
+    if (mesher_)
+        mesher_->renew(dataset(), memory_.height_slots);
+    else
+        mesher_ = std::make_unique<PageMesher>(dataset(), options_.lod, memory_.height_slots);
+}
+
+// Thins what was selected, where the method does.
+void Scene::mesh(std::span<const Camera> views, double half_curvature, const Residency& residency,
+                 Selection& selection) {
+    if (mesher_) mesher_->mesh(views, {options_.tau_px, half_curvature}, residency, selection);
+}
+
 void Scene::forget_selections() {
     last_ = {};
     foreseen_ = nullptr;
@@ -76,6 +121,10 @@ void Scene::forget_selections() {
 
 Result<void> Scene::start(TileSink& sink) {
     sink_ = &sink;
+    if (mesher_) {
+        mesher_sink_ = std::make_unique<Sink>(sink, *this);
+        sink_ = mesher_sink_.get();
+    }
     if (auto ok = make_pager(); !ok) return ok;
     if (options_.follow) watch_ = std::make_unique<StoreWatch>(store_, std::max(options_.loader_threads, 1));
     return {};
@@ -91,8 +140,12 @@ void Scene::tell(const std::string& message) const {
 // A store is drawn as it was at one moment: where an update comes in between, it is opened once more.
 Result<void> Scene::make_pager() {
     for (int tries = 1;; ++tries) {
-        auto pager =
-            Pager::create(store_, {memory_, options_.loader_threads, options_.latency_ms, options_.textures}, *sink_);
+        PagerOptions pager_options{memory_, options_.loader_threads, options_.latency_ms, options_.textures, {}};
+        pager_options.corrections = options_.lod.metric == ErrorMetric::deboer;
+        if (mesher_)
+            pager_options.measure =
+                std::make_shared<PageMeasure>(dataset().lattice.tile_cells_log2, options_.lod.metric);
+        auto pager = Pager::create(store_, pager_options, *sink_);
         if (pager) {
             pager_ = std::move(*pager);
             pager_->on_damage = [this, path = store_->path()](const std::string& what) {
@@ -110,12 +163,13 @@ Result<void> Scene::make_pager() {
 // Divides memory anew. No tile is resident.
 Result<void> Scene::use_store(std::shared_ptr<const SqliteStore> store) {
     if (auto ok = expect_same_place(*store); !ok) return ok;
-    auto plan = plan_memory(store->dataset(), options_.budget_bytes);
+    auto plan = plan_of(store->dataset(), options_);
     if (!plan) return plan.error();
     store_ = std::move(store);
     memory_ = *plan;
     peak_resident_bytes_ = std::max(peak_resident_bytes_, memory_.resident_bytes);
     make_selectors();
+    make_mesher();
     return sink_->renew(dataset(), memory_);
 }
 
@@ -135,7 +189,7 @@ bool Scene::fits_in_place(const Dataset& next) const {
     if (next.height_offset_m != now.height_offset_m || next.height_quantum_m != now.height_quantum_m ||
         next.texture_size_log2 != now.texture_size_log2)
         return false;
-    const auto plan = plan_memory(next, options_.budget_bytes);
+    const auto plan = plan_of(next, options_);
     if (!plan) return false;
     if (plan->height_slots == memory_.height_slots && plan->texture_slots == memory_.texture_slots) return true;
     const auto holds_all = [&](const MemoryPlan& m) {
@@ -214,14 +268,17 @@ LoaderCounters Scene::loader_counters(TileKind kind) const {
 }
 
 SelectionSettings Scene::selection_settings(double half_curvature, double growth_s) const {
-    return {options_.tau_px,
+    const bool meshed = mesher_ != nullptr;
+    return {meshed ? options_.tau_px * kCutShare : options_.tau_px,
             options_.texture_tau_px,
             memory_.height_slots,
             memory_.texture_slots,
             half_curvature,
-            options_.morph,
+            options_.morph && !meshed,
             growth_s,
-            moved_m_};
+            moved_m_,
+            options_.lod.metric,
+            options_.lod.culling};
 }
 
 void Scene::note_motion(std::span<const Camera> views, double now_s) {
@@ -302,15 +359,16 @@ bool Scene::think_of_both(std::span<const Camera> views, double growth_s, SceneF
     SelectionSettings settings = selection_settings(frame.half_curvature, growth_s);
     settings.height_slots /= 2;
     settings.texture_slots /= 2;
-    const Selection& shown = selector_->select(views, settings, pager_->residency());
+    Selection& shown = selector_->select(views, settings, pager_->residency());
+    const double shown_bound_px = shown.max_bound_px;  // of tiles: the other's meshes are not made yet
+    mesh(views, settings.half_curvature, pager_->residency(), shown);
     Pager::Wishes coming_wishes;
     if (pager_->roots_ready()) {
         if (!roots_since_s_) roots_since_s_ = pager_->residency().now_s;
         settings.growth_s = 0;
         settings.half_curvature = curvature_of(coming_->dataset(), views);
         const Selection& coming = coming_selector_->select(views, settings, pager_->coming());
-        const bool as_good =
-            coming.max_bound_px <= shown.max_bound_px && coming.requests.size() <= shown.requests.size();
+        const bool as_good = coming.max_bound_px <= shown_bound_px && coming.requests.size() <= shown.requests.size();
         // An eye that moves fast may never see all of it.
         const bool late = !pager_->stale() && pager_->residency().now_s > *roots_since_s_ + kLongestTakeover_s;
         if (coming.complete || as_good || late) {
@@ -346,7 +404,8 @@ SceneFrame Scene::think(std::span<const Camera> views, double growth_s) {
         return frame;
     }
     last_settings_ = settings;
-    const Selection& now = selector_->select(views, settings, pager_->residency());
+    Selection& now = selector_->select(views, settings, pager_->residency());
+    mesh(views, settings.half_curvature, pager_->residency(), now);
     settings.growth_s = 0;
     bool fresh = false;
     if (growth_s > 0 && options_.foresight_s > 0 && !views.empty() && !now.budget_limited)

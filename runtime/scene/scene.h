@@ -11,6 +11,8 @@
 #include <string>
 
 #include "common/store/sqlite_store.h"
+#include "runtime/lod/lod_method.h"
+#include "runtime/lod/page_mesher.h"
 #include "runtime/lod/selection.h"
 #include "runtime/paging/pager.h"
 #include "runtime/scene/store_watch.h"
@@ -24,6 +26,7 @@ struct SceneOptions {
     double tau_px = 1;
     double texture_tau_px = 1;
     Curvature curvature = Curvature::automatic;
+    LodSettings lod;         ///< fixed from open() on
     bool morph = true;       ///< false: discrete levels
     double growth_s = 0.08;  ///< a level, in which a tile that came late grows out of what stood in for it
     double foresight_s = 1;  ///< how far ahead of the eye tiles are fetched; 0: not at all
@@ -49,6 +52,7 @@ struct SceneFrame {
 
 class Scene {
 public:
+    /// Errors: ErrorCode::usage where the budget is too small or `options.lod` is not built in.
     static Result<std::unique_ptr<Scene>> open(std::shared_ptr<const SqliteStore> store, const SceneOptions& options);
     /// `store` outlives the scene.
     static Result<std::unique_ptr<Scene>> open(const SqliteStore& store, const SceneOptions& options) {
@@ -65,6 +69,10 @@ public:
     /// Updates taken up: of which what is drawn is the last.
     std::int64_t updates() const { return updates_; }
     const MemoryPlan& memory() const { return memory_; }
+    /// What thins the tiles drawn; null where they are drawn by patterns (geomip).
+    const PageMesher* mesher() const { return mesher_.get(); }
+    /// The meshes that the tiles drawn are drawn with; stays where it is. Null likewise.
+    const MeshPool* meshes() const { return mesher_ ? &mesher_->pool() : nullptr; }
     /// Greatest of memory().resident_bytes so far.
     std::int64_t peak_resident_bytes() const { return peak_resident_bytes_; }
     /// Of all the flight, whatever was taken up.
@@ -90,8 +98,13 @@ public:
     Result<SceneFrame> complete(std::span<const Camera> views, const std::function<bool()>& stop = {});
 
 private:
+    /// Passes tiles on, and their vertices' costs to the mesher.
+    class Sink;
     Scene(std::shared_ptr<const SqliteStore> store, const SceneOptions& options, const MemoryPlan& memory);
     void make_selectors();
+    void make_mesher();
+    void mesh(std::span<const Camera> views, double half_curvature, const Residency& residency, Selection& selection);
+    static Result<MemoryPlan> plan_of(const Dataset& dataset, const SceneOptions& options);
     void forget_selections();
     void tell(const std::string& message) const;
     Result<void> make_pager();
@@ -116,6 +129,8 @@ private:
     SceneOptions options_;
     MemoryPlan memory_;
     TileSink* sink_ = nullptr;
+    std::unique_ptr<PageMesher> mesher_;
+    std::unique_ptr<Sink> mesher_sink_;
     std::unique_ptr<Pager> pager_;
     std::unique_ptr<Selector> selector_, ahead_;
     std::unique_ptr<StoreWatch> watch_;

@@ -30,7 +30,7 @@ FrameSettings scenery(const Dataset& d) {
 }
 
 Result<std::unique_ptr<SceneRenderer>> SceneRenderer::create(const Scene& scene, const SceneRendererOptions& options) {
-    std::unique_ptr<SceneRenderer> made(new SceneRenderer(options));
+    std::unique_ptr<SceneRenderer> made(new SceneRenderer(options, scene.meshes()));
     made->settings_ = scenery(scene.dataset());
     if (auto ok = made->make_renderer(scene.dataset(), scene.memory()); !ok) return ok.error();
     return made;
@@ -39,6 +39,8 @@ Result<std::unique_ptr<SceneRenderer>> SceneRenderer::create(const Scene& scene,
 Result<void> SceneRenderer::make_renderer(const Dataset& dataset, const MemoryPlan& plan) {
     renderer_.reset();  // never the memory of two
     renderer_options_ = options_of(dataset, plan, options_.anisotropy);
+    renderer_options_.mesh_indices = meshes_ != nullptr ? meshes_->capacity() : 0;
+    meshes_passed_on_ = 0;
     auto renderer = Renderer::create(renderer_options_);
     if (!renderer) return renderer.error();
     renderer_ = std::move(*renderer);
@@ -57,6 +59,7 @@ bool SceneRenderer::fits(const Dataset& d, const MemoryPlan& plan) const {
 
 Result<void> SceneRenderer::renew(const Dataset& d, const MemoryPlan& plan) {
     const FrameSettings fresh = scenery(d);
+    meshes_passed_on_ = 0;
     settings_.haze_distance_m = fresh.haze_distance_m;
     settings_.haze_scale_height_m = fresh.haze_scale_height_m;
     settings_.ground_height_m = fresh.ground_height_m;
@@ -71,8 +74,16 @@ void SceneRenderer::put_texture(std::int32_t slot, std::span<const std::uint8_t>
     renderer_->upload_texture(slot, chain);
 }
 
+void SceneRenderer::pass_meshes_on() {
+    if (meshes_ == nullptr) return;
+    for (const MeshPool::Piece& piece : meshes_->written_since(meshes_passed_on_))
+        renderer_->upload_mesh(piece.first, piece.indices);
+    meshes_passed_on_ = meshes_->written();
+}
+
 FrameTimes SceneRenderer::draw(const Camera& camera, std::span<const DrawItem> draws, double half_curvature,
                                RenderTarget& target) {
+    pass_meshes_on();
     settings_.half_curvature = half_curvature;
     return renderer_->draw(camera, draws, settings_, target);
 }

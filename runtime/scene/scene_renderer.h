@@ -29,8 +29,8 @@ struct SceneRendererOptions {
 
 class SceneRenderer final : public TileSink {
 public:
-    /// Takes all of the scene's tile memory, and has the driver compile what frames will need. Errors
-    /// (ErrorCode::display): those of Renderer and RenderTarget.
+    /// `scene` outlives it. Takes all of the scene's tile memory, and has the driver compile what frames will need.
+    /// Errors (ErrorCode::display): those of Renderer and RenderTarget.
     static Result<std::unique_ptr<SceneRenderer>> create(const Scene& scene, const SceneRendererOptions& options = {});
 
     Result<void> renew(const Dataset& dataset, const MemoryPlan& plan) override;
@@ -53,10 +53,14 @@ public:
     const RendererOptions& renderer_options() const { return renderer_options_; }
 
 private:
-    explicit SceneRenderer(const SceneRendererOptions& options) : options_(options) {}
+    SceneRenderer(const SceneRendererOptions& options, const MeshPool* meshes) : options_(options), meshes_(meshes) {}
     Result<void> make_renderer(const Dataset& dataset, const MemoryPlan& plan);
 
+    void pass_meshes_on();
+
     SceneRendererOptions options_;
+    const MeshPool* meshes_;              ///< the scene's; null: none
+    std::uint64_t meshes_passed_on_ = 0;  ///< MeshPool::written() of what the renderer has
     RendererOptions renderer_options_;
     std::unique_ptr<Renderer> renderer_;
     FrameSettings settings_;

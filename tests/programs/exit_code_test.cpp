@@ -46,7 +46,7 @@ TEST_F(ExitCodes, HelpIsZeroForEveryCommand) {
         EXPECT_EQ(run.exit_code, 0) << describe(run);
         EXPECT_NE(run.out.find("--json"), std::string::npos) << describe(run);
     }
-    for (const char* command : {"shot", "fly", "audit"}) {
+    for (const char* command : {"view", "shot", "fly", "audit", "compare"}) {
         const auto run = scree_view({command, "--help"});
         EXPECT_EQ(run.exit_code, 0) << describe(run);
         EXPECT_NE(run.out.find("--json"), std::string::npos) << describe(run);
@@ -115,6 +115,10 @@ TEST_F(ExitCodes, WrongUseIsTwo) {
         {"shot", store_, "-o", other_, "--eye", "1,2,nan", "--look", "0,0,0"},
         {"shot", store_, "-o", other_, "--eye", "1,2,3", "--look", "1,2,3"},
         {"audit", store_, "--json"},
+        {"audit", store_, "--lod", "roam"},
+        {"audit", store_, "--lod", "rsg", "--metric", "deboer"},
+        {"audit", store_, "--s", "0.1"},
+        {"audit", store_, "--cache", "exact"},
     };
     for (const auto& arguments : wrong_views) expect_refused(scree_view(arguments), kUsage, {});
     EXPECT_FALSE(std::filesystem::exists(other_));

@@ -10,9 +10,9 @@
 #include <filesystem>
 #include <vector>
 
+#include "common/progress.h"
 #include "common/report.h"
 #include "tools/partial_file.h"
-#include "tools/progress.h"
 
 namespace scree {
 namespace {

@@ -20,6 +20,7 @@
 
 #include "common/cli/arguments.h"
 #include "common/process_usage.h"
+#include "common/progress.h"
 #include "common/report.h"
 #include "common/store/byte_io.h"
 #include "tools/cli/height_options.h"
@@ -27,7 +28,6 @@
 #include "tools/mosaic/sample_positions.h"
 #include "tools/mosaic/visible_samples.h"
 #include "tools/partial_file.h"
-#include "tools/progress.h"
 #include "tools/source/isolated_decoder.h"
 
 namespace scree {

@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "common/cli/arguments.h"
+#include "common/progress.h"
 #include "common/report.h"
-#include "tools/progress.h"
 #include "tools/source/synth.h"
 
 namespace scree {

@@ -15,10 +15,10 @@
 #include <thread>
 
 #include "common/process_usage.h"
+#include "common/progress.h"
 #include "common/report.h"
 #include "common/store/page_checksum_vfs.h"
 #include "tools/partial_file.h"
-#include "tools/progress.h"
 #include "tools/pyramid/build_state.h"
 #include "tools/pyramid/height_stage.h"
 #include "tools/pyramid/texture_stage.h"

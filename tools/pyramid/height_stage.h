@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "common/progress.h"
 #include "common/result.h"
-#include "tools/progress.h"
 #include "tools/pyramid/build_plan.h"
 #include "tools/pyramid/height_index.h"
 #include "tools/pyramid/tile_writer.h"

@@ -17,8 +17,8 @@
 #include <tuple>
 
 #include "common/process_usage.h"
+#include "common/progress.h"
 #include "tools/partial_file.h"
-#include "tools/progress.h"
 #include "tools/pyramid/build_record.h"
 #include "tools/pyramid/height_stage.h"
 #include "tools/pyramid/texture_stage.h"

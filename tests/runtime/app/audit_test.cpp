@@ -6,6 +6,7 @@
 
 #include "common/mesh/geometric_error.h"
 #include "tests/runtime/lod/drawn_frame.h"
+#include "tests/runtime/lod/grid_mesh.h"
 #include "tests/runtime/lod/memory_store.h"
 #include "tests/runtime/lod/selection_support.h"
 
@@ -203,6 +204,80 @@ TEST(Audit, MeasuresADroppedSpikeInPixels) {
     EXPECT_NEAR(errors.max(), camera->focal_px() * 10 / 1000, 1e-9);
     // Every other vertex in view is where it should be.
     EXPECT_EQ(errors.quantile(1 - 1.5 / static_cast<double>(errors.count())), errors.count() > 4 ? 0 : errors.max());
+}
+
+TEST(Audit, MeasuresTheMeshThatATileIsDrawnByInPlaceOfItsPattern) {
+    const test::TerrainShape shape;
+    const test::SyntheticTerrain terrain(shape,
+                                         [](std::int64_t i, std::int64_t j) { return i == 24 && j == 40 ? 40 : 0; });
+    Audited a(terrain);
+    const Lattice& l = terrain.lattice();
+    auto camera = look_at({l.x_m(24), l.y_m(40) - 1000, 50}, {l.x_m(24), l.y_m(40), 50}, 40, 800, 800);
+    ASSERT_TRUE(camera.ok());
+    MeshPool pool(1000, 3 * 128);
+    const auto worst_px = [&](bool with_spike) {
+        test::GridMesh mesh(3);
+        mesh.set(3, 5, with_spike);
+        DrawItem root;
+        root.height_slot = terrain.index({0, 0, 0});
+        root.mesh = pool.put(mesh.indices());
+        ErrorHistogram errors;
+        EXPECT_TRUE(audit_frame(a.store, *a.reader, {*camera, {root}, a.arena, 0, &pool}, errors).ok());
+        return errors.max();
+    };
+    EXPECT_NEAR(worst_px(false), camera->focal_px() * 10 / 1000, 1e-9);
+    // The spike is there, and so is its slope where the ground is flat.
+    EXPECT_GT(worst_px(true), 1);
+    EXPECT_LT(worst_px(true), camera->focal_px() * 10 / 1000);
+}
+
+TEST(Audit, OfMeshesWithThePatternsTrianglesIsThatOfThePatterns) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    for (int world = 0; world < 8; ++world) {
+        const auto terrain = test::random_terrain(random, 0, 1, test::depth_of_world(world));
+        const int n = terrain.lattice().tile_cells_log2;
+        const TilePatterns patterns(n);
+        Audited a(terrain);
+        for (int k = 0; k < 6; ++k) {
+            const Camera camera = test::random_camera(random, terrain);
+            SelectionSettings settings = test::with_tau(std::exp(test::uniform_real(random, -2, 5)));
+            settings.half_curvature = test::random_half_curvature(random, terrain);
+            settings.morph = false;
+            const Selection& s = a.selector.select({&camera, 1}, settings, a.residency);
+            const ErrorHistogram by_patterns = a.audit(camera, s.draws[0], settings.half_curvature);
+            DrawList draws = s.draws[0];
+            const std::size_t largest = patterns.range(0, 0).count;
+            MeshPool pool(largest * (draws.size() + 1), largest);
+            for (DrawItem& item : draws) {
+                const PatternRange range = patterns.range(item.geomip, item.edge_mask);
+                item.mesh = pool.put(std::span(patterns.indices()).subspan(range.first, range.count));
+            }
+            ErrorHistogram errors;
+            ASSERT_TRUE(
+                audit_frame(a.store, *a.reader, {camera, draws, a.arena, settings.half_curvature, &pool}, errors).ok());
+            ASSERT_EQ(errors.count(), by_patterns.count());
+            ASSERT_NEAR(errors.max(), by_patterns.max(), 1e-6 * (1 + by_patterns.max()));
+            ASSERT_NEAR(errors.mean(), by_patterns.mean(), 1e-6 * (1 + by_patterns.mean()));
+        }
+    }
+}
+
+TEST(Audit, FailsAtAMeshWithAHole) {
+    const test::SyntheticTerrain terrain({}, test::rough_heights(1, 100));
+    Audited a(terrain);
+    auto camera = look_at({terrain.lattice().x_m(32), terrain.lattice().y_m(32), 5000},
+                          {terrain.lattice().x_m(32), terrain.lattice().y_m(30), 0}, 40, 800, 800);
+    std::vector<std::uint32_t> indices = test::GridMesh(3).indices();
+    indices.resize(indices.size() - 3);
+    MeshPool pool(100, 100);
+    DrawItem root;
+    root.height_slot = terrain.index({0, 0, 0});
+    root.mesh = pool.put(indices);
+    ErrorHistogram errors;
+    const auto audited = audit_frame(a.store, *a.reader, {*camera, {root}, a.arena, 0, &pool}, errors);
+    ASSERT_FALSE(audited.ok());
+    EXPECT_EQ(audited.error().code, ErrorCode::check_failed);
 }
 
 TEST(Audit, HandsOnTheErrorOfADamagedStore) {

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "tests/runtime/lod/drawn_frame.h"
+#include "tests/runtime/lod/grid_mesh.h"
 #include "tests/runtime/lod/selection_support.h"
 
 namespace scree {
@@ -136,6 +137,64 @@ TEST_F(Mesh, WithATriangleTwiceOrTurnedOverIsOpen) {
     DrawnMesh turned = mesh();
     std::swap(turned.corners[300], turned.corners[301]);
     EXPECT_GT(cracks(turned).open_edges, 0);
+}
+
+TEST_F(Mesh, OfMeshesWithThePatternsTrianglesIsThatOfThePatterns) {
+    for (DrawItem& item : draws_) {
+        item.morph = 0;
+        item.edge_morph = {};
+    }
+    const DrawnMesh by_patterns = mesh();
+    MeshPool pool(by_patterns.corners.size(), 3 * 128);
+    DrawList meshed = draws_;
+    for (DrawItem& item : meshed) {
+        if (item.geomip == 1) continue;  // beside tiles that keep their pattern
+        const PatternRange range = patterns_.range(item.geomip, item.edge_mask);
+        item.mesh = pool.put(std::span(patterns_.indices()).subspan(range.first, range.count));
+        item.geomip = 0;
+        item.edge_mask = 0;
+    }
+    EXPECT_EQ(drawn_mesh(terrain_.dataset(), patterns_, meshed, arena_, &pool).corners, by_patterns.corners);
+}
+
+TEST_F(Mesh, WithoutOneVertexOfASharedEdgeHasOneTJunction) {
+    DrawItem west, east;
+    west.tile = {3, 2, 2};
+    east.tile = {3, 3, 2};
+    draws_ = {west, east};
+    MeshPool pool(10'000, 3 * 128);
+    const auto report = [&](bool west_has, bool east_has) {
+        for (std::size_t k = 0; k < 2; ++k) {
+            test::GridMesh mesh(3);
+            mesh.select_stride(1);
+            mesh.set(k == 0 ? 8 : 0, 3, k == 0 ? west_has : east_has);
+            draws_[k].height_slot = terrain_.index(draws_[k].tile);
+            draws_[k].mesh = pool.put(mesh.indices());
+        }
+        return cracks(drawn_mesh(terrain_.dataset(), patterns_, draws_, arena_, &pool));
+    };
+    EXPECT_EQ(report(true, true).open_edges, 0);
+    EXPECT_EQ(report(false, false).open_edges, 0);
+    for (const bool west_has : {false, true}) {
+        const CrackReport cracked = report(west_has, !west_has);
+        EXPECT_EQ(cracked.open_edges, 3);
+        EXPECT_EQ(cracked.t_junctions, 1);
+    }
+}
+
+TEST_F(Mesh, OfAMeshWithAHoleIsOpenRoundTheHole) {
+    test::GridMesh whole(3);
+    whole.select_stride(2);
+    std::vector<std::uint32_t> indices = whole.indices();
+    MeshPool pool(1000, indices.size());
+    DrawItem item;
+    item.height_slot = terrain_.index(item.tile);
+    item.mesh = pool.put(indices);
+    draws_ = {item};
+    EXPECT_EQ(cracks(drawn_mesh(terrain_.dataset(), patterns_, draws_, arena_, &pool)).open_edges, 0);
+    indices.erase(indices.begin() + 3 * 9, indices.begin() + 3 * 10);
+    draws_[0].mesh = pool.put(indices);
+    EXPECT_GE(cracks(drawn_mesh(terrain_.dataset(), patterns_, draws_, arena_, &pool)).open_edges, 2);
 }
 
 TEST_F(Mesh, ComesBackFromItsPlyFile) {

@@ -10,6 +10,7 @@
 
 #include "runtime/app/audit.h"
 #include "tests/runtime/lod/drawn_frame.h"
+#include "tests/runtime/lod/grid_mesh.h"
 #include "tests/runtime/lod/memory_store.h"
 #include "tests/runtime/lod/selection_support.h"
 
@@ -97,13 +98,14 @@ public:
         return errors;
     }
     Judged by(Source& source, const Camera& camera, const DrawList& draws, double stated_m = 0,
-              double half_curvature = 0) {
+              double half_curvature = 0, const MeshPool* meshes = nullptr) {
         Judged judged;
         const auto judge = SourceJudge::make(terrain.dataset(), *reader_, source.get());
         EXPECT_TRUE(judge.ok());
         judged.not_drawn = judge->not_drawn();
-        audit_against(terrain.dataset(), *judge, {camera, draws, arena_, half_curvature}, stated_m, judged.errors,
-                      judged.excess_px);
+        EXPECT_TRUE(audit_against(terrain.dataset(), *judge, {camera, draws, arena_, half_curvature, meshes}, stated_m,
+                                  judged.errors, judged.excess_px)
+                        .ok());
         return judged;
     }
     /// Every deepest tile that is stored.
@@ -163,6 +165,23 @@ TEST(SourceAudit, AgainstTheSamplesOfTheStoreItIsTheAuditOfTheStore) {
         }
     }
     EXPECT_GT(samples, 50000);
+}
+
+TEST(SourceAudit, JudgesTheMeshThatATileIsDrawnBy) {
+    const SyntheticTerrain terrain({}, test::rough_heights(5, 400));
+    Audited a(terrain);
+    Source source(terrain);
+    const Camera camera = a.above();
+    const Judged exact = a.by(source, camera, a.finest());
+    MeshPool pool(128 * a.finest().size(), 128);
+    DrawList flat = a.finest();
+    for (DrawItem& item : flat) item.mesh = pool.put(test::GridMesh(3).indices());
+    const Judged coarse = a.by(source, camera, flat, 0, 0, &pool);
+    DrawList patterns = a.finest();
+    for (DrawItem& item : patterns) item.geomip = 2;
+    EXPECT_EQ(coarse.errors.count(), exact.errors.count());
+    EXPECT_GT(coarse.errors.mean(), a.by(source, camera, patterns).errors.mean());
+    EXPECT_GT(a.by(source, camera, patterns).errors.mean(), exact.errors.mean());
 }
 
 TEST(SourceAudit, EverySampleOfAPresentCellIsJudgedOnceOnBordersAndRimsToo) {

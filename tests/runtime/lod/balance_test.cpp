@@ -51,6 +51,8 @@ TEST(Balance, RandomCutsOverRandomResidencyAreWatertightAndDrawEveryVisibleCellO
             if (k % 2 == 0) settings.half_curvature = test::random_half_curvature(random, terrain);
             if (k % 4 >= 2) test::arrive_at_random(random, terrain, residency, settings);
             settings.morph = k % 8 != 7;
+            if (k % 3 == 1) settings.metric = ErrorMetric::deboer;
+            if (k % 2 == 1) residency.keep_corrections();
             const Camera camera = test::random_camera(random, terrain);
             const Selection& s = selector.select({&camera, 1}, settings, residency);
             expect_whole(terrain, residency, camera, s.draws[0], arena, patterns, settings.half_curvature);

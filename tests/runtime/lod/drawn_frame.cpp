@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
-#include <map>
+#include <utility>
 
 #include "common/mesh/vertex_slot.h"
 
@@ -95,27 +95,30 @@ std::string DrawnFrame::unbalanced() const {
 
 std::string DrawnFrame::leak(const DrawnMesh& mesh) const {
     using Directed = std::pair<LatticeVertex, LatticeVertex>;
-    std::map<Directed, int> uses;
+    std::vector<Directed> uses;
+    uses.reserve(mesh.corners.size());
     std::int64_t twice_area = 0;
     for (std::size_t t = 0; t < mesh.corners.size(); t += 3) {
         const LatticeVertex &a = mesh.corners[t], &b = mesh.corners[t + 1], &c = mesh.corners[t + 2];
         const std::int64_t area = std::int64_t{b.j - a.j} * (c.i - a.i) - std::int64_t{b.i - a.i} * (c.j - a.j);
         if (area <= 0) return fmt::format("a triangle at {}, {} faces down", a.i, a.j);
         twice_area += area;
-        for (std::size_t k = 0; k < 3; ++k) ++uses[{mesh.corners[t + k], mesh.corners[t + (k + 1) % 3]}];
+        for (std::size_t k = 0; k < 3; ++k) uses.emplace_back(mesh.corners[t + k], mesh.corners[t + (k + 1) % 3]);
     }
     if (twice_area != 2 * drawn_)
         return fmt::format("triangles of twice the area {} over {} cells", twice_area, drawn_);
-    for (const auto& [edge, count] : uses) {
-        const auto& [a, b] = edge;
-        if (count != 1) return fmt::format("the edge {}, {} - {}, {} is used twice one way", a.i, a.j, b.i, b.j);
-        if (uses.contains({b, a})) continue;
+    std::sort(uses.begin(), uses.end());
+    for (std::size_t k = 0; k < uses.size(); ++k) {
+        const auto& [a, b] = uses[k];
+        if (k > 0 && uses[k] == uses[k - 1])
+            return fmt::format("the edge {}, {} - {}, {} is used twice one way", a.i, a.j, b.i, b.j);
+        if (std::binary_search(uses.begin(), uses.end(), Directed{b, a})) continue;
         if (a.i != b.i && a.j != b.j) return fmt::format("a single diagonal edge at {}, {}", a.i, a.j);
         // The triangle lies to the left; nothing may be drawn to the right of any part of the edge.
-        for (std::int64_t k = std::min(a.i, b.i); k < std::max(a.i, b.i); ++k)
-            if (item_at(k, b.i > a.i ? a.j : a.j - 1) >= 0) return fmt::format("an open edge at {}, {}", k, a.j);
-        for (std::int64_t k = std::min(a.j, b.j); k < std::max(a.j, b.j); ++k)
-            if (item_at(b.j < a.j ? a.i : a.i - 1, k) >= 0) return fmt::format("an open edge at {}, {}", a.i, k);
+        for (std::int64_t i = std::min(a.i, b.i); i < std::max(a.i, b.i); ++i)
+            if (item_at(i, b.i > a.i ? a.j : a.j - 1) >= 0) return fmt::format("an open edge at {}, {}", i, a.j);
+        for (std::int64_t j = std::min(a.j, b.j); j < std::max(a.j, b.j); ++j)
+            if (item_at(b.j < a.j ? a.i : a.i - 1, j) >= 0) return fmt::format("an open edge at {}, {}", a.i, j);
     }
     return {};
 }

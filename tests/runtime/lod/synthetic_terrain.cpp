@@ -7,6 +7,7 @@
 
 #include "common/mesh/drawn_surface.h"
 #include "common/mesh/geometric_error.h"
+#include "common/mesh/vertex_slot.h"
 
 namespace scree::test {
 namespace {
@@ -28,8 +29,8 @@ SyntheticTerrain::SyntheticTerrain(const TerrainShape& shape, HeightFunction hei
       error_growth_(shape.error_growth),
       depth_(shape.depth),
       texture_depth_(shape.texture_depth_map) {
-    auto lattice =
-        make_lattice(300000.5, 2700000.25, shape.spacing_m, shape.cells_x, shape.cells_y, shape.tile_cells_log2);
+    auto lattice = make_lattice(shape.origin_x_m, shape.origin_y_m, shape.spacing_m, shape.cells_x, shape.cells_y,
+                                shape.tile_cells_log2);
     EXPECT_TRUE(lattice.ok());
     dataset_.lattice = *lattice;
     dataset_.height_offset_m = 50;
@@ -366,6 +367,13 @@ Camera random_camera(Random& random, const SyntheticTerrain& terrain) {
     return *camera;
 }
 
+LevelCorrections corrections_of(const SyntheticTerrain& terrain, TileId id) {
+    const int n = terrain.lattice().tile_cells_log2;
+    std::vector<SlotVertex> vertices(slot_vertex_count(n));
+    fill_vertex_slot(terrain.tile(id)->samples, n, vertices);
+    return level_corrections(vertices, n);
+}
+
 FakeResidency::FakeResidency(const SyntheticTerrain& terrain) : terrain_(&terrain) {
     for (const TileKind kind : {TileKind::height, TileKind::texture}) {
         ResidentPages& pages = tables_.of(kind);
@@ -430,6 +438,11 @@ void FakeResidency::set_arrived(TileKind kind, TileId id, double seconds) {
 void FakeResidency::set_has_textures(bool has) {
     tables_.has_textures = has;
     stale_ = true;
+}
+
+void FakeResidency::keep_corrections() {
+    tables_.heights.corrections.clear();
+    for (const TileId id : terrain_->tiles()) tables_.heights.corrections.push_back(corrections_of(*terrain_, id));
 }
 
 const Residency& FakeResidency::tables() const {

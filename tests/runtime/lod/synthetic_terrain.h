@@ -29,6 +29,8 @@ struct TerrainShape {
     int tile_cells_log2 = 3;
     std::int64_t cells_x = 64;
     std::int64_t cells_y = 64;
+    double origin_x_m = 300000.5;
+    double origin_y_m = 2700000.25;
     double spacing_m = 10;
     double quantum_m = 0.25;
     /// 0: one texture a root, so that pages are split for geometry alone. May pass the heights' depth by
@@ -109,6 +111,9 @@ inline double uniform_real(Random& random, double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random);
 }
 
+/// What a pager that keeps them knows of a tile's levels.
+LevelCorrections corrections_of(const SyntheticTerrain& terrain, TileId id);
+
 /// Tables over any set of the terrain's tiles, each in the slot of its index in tiles() or textures(). Made anew when
 /// asked for after a change; one thread.
 class FakeResidency {
@@ -136,6 +141,8 @@ public:
     void set_texture_arrived(TileId id, double seconds) { set_arrived(TileKind::texture, id, seconds); }
     void set_now(double seconds) { tables_.now_s = seconds; }
     void set_has_textures(bool has);
+    /// As PagerOptions::corrections.
+    void keep_corrections();
 
     /// Valid until the next change.
     const Residency& tables() const;

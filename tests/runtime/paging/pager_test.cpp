@@ -60,8 +60,9 @@ public:
           memory_(memory),
           sink_(terrain, memory),
           planner_(terrain.dataset(), memory, detail, prefetch) {
+        for (const TileId id : terrain.tiles()) corrections_.push_back(test::corrections_of(terrain, id));
         const std::int64_t before = store.reads_begun();
-        auto created = Pager::create(store, {memory, threads, 0, true}, sink_);
+        auto created = Pager::create(store, {memory, threads, 0, true, {}, true}, sink_);
         EXPECT_TRUE(created.ok());
         pager_ = std::move(*created);
         taken_ = store.reads_begun();
@@ -124,9 +125,10 @@ private:
         const ResidentPages& pages = pager_->residency().of(kind);
         const auto at = static_cast<std::size_t>(slot);
         expect_content(kind, id, slot);
-        if (kind == TileKind::height)
+        if (kind == TileKind::height) {
             ASSERT_EQ(pages.headers.at(at), terrain_.tile(id)->header);
-        else
+            ASSERT_EQ(pages.corrections.at(at), corrections_.at(static_cast<std::size_t>(terrain_.index(id))));
+        } else
             ASSERT_EQ(pages.headers.at(at).child_mask, terrain_.texture_children(id));
         ASSERT_TRUE(id.level == 0 ? std::isinf(pages.arrived_s.at(at)) && pages.arrived_s.at(at) < 0
                                   : pages.arrived_s.at(at) > 0 && pages.arrived_s.at(at) <= frames_);
@@ -162,6 +164,7 @@ private:
         ASSERT_LE(static_cast<std::int64_t>(resident) + under_way, memory_.height_slots + memory_.texture_slots);
     }
 
+    std::vector<LevelCorrections> corrections_;  ///< by the tile's index
     const SyntheticTerrain& terrain_;
     const MemoryStore& store_;
     const MemoryPlan memory_;

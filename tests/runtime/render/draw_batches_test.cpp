@@ -67,6 +67,26 @@ TEST(DrawBatches, ItemsWithoutARingAreFilteredWhole) {
     }
 }
 
+TEST(DrawBatches, AMeshIsOneDrawInTheGroupThatItsRingWouldBeIn) {
+    DrawBatches batches = make(3, 3);
+    for (DrawItem item : {item_in(0), item_in(1, {1}), item_in(2, {2, 1}), item_in(2, {0, 1})})
+        for (const float share : {1.0f, 0.5f}) {
+            item.texture_share = share;
+            item.mesh = {};
+            const DrawBatch border = border_batch(batches, item);
+            item.mesh = {0, 0, 6};
+            const DrawBatch mesh = border_batch(batches, item);
+            ASSERT_EQ(batches.draws().size(), 1u);
+            EXPECT_EQ(batches.draws()[0].shape, DrawShape::whole);
+            EXPECT_EQ(mesh.imagery, border.imagery);
+            EXPECT_EQ(mesh.arrays, border.arrays);
+        }
+    DrawItem inside = item_in(0, {0});
+    inside.mesh = {0, 0, 6};
+    inside.texture = {0, 0.25f, 0.25f, 0.5f};
+    EXPECT_EQ(border_batch(batches, inside).imagery, Imagery::plain);
+}
+
 TEST(DrawBatches, TilesInsideAnAncestorsTextureArePlain) {
     DrawBatches batches = make(1, 1);
     DrawItem item = item_in(0, {0});

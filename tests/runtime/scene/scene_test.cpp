@@ -169,6 +169,44 @@ TEST_F(SceneOfHills, WhatCatchingUpFetchedStandsAtOnceAndWhatComesLaterGrows) {
     }
 }
 
+TEST_F(SceneOfHills, AMethodThatIsNotBuiltInIsRefusedBeforeAnythingIsTaken) {
+    SceneOptions options = small_options();
+    options.lod.metric = ErrorMetric::uc;  // with geomip: nothing will ever draw so
+    options.budget_bytes = 1;
+    const auto scene = Scene::open(stored_->store(), options);
+    ASSERT_FALSE(scene.ok());
+    EXPECT_EQ(scene.error().code, ErrorCode::usage);
+    EXPECT_NE(scene.error().message.find("not built in"), std::string::npos) << scene.error().message;
+}
+
+TEST_F(SceneOfHills, ThePapersMetricGoesByWhatItsTilesCorrect) {
+    const Camera camera = stored_->camera(200, 512);
+    Staged own(*stored_, small_options());
+    SceneOptions options = small_options();
+    options.lod.metric = ErrorMetric::deboer;
+    Staged paper(*stored_, options);
+    const auto guaranteed = own.scene->complete({&camera, 1}), deboer = paper.scene->complete({&camera, 1});
+    ASSERT_TRUE(guaranteed.ok() && deboer.ok());
+    EXPECT_LE(guaranteed->selection->max_bound_px, 2);
+    EXPECT_GT(deboer->selection->max_bound_px, 2);
+    EXPECT_LT(deboer->selection->triangles, guaranteed->selection->triangles);
+    EXPECT_TRUE(own.scene->pager().residency().heights.corrections.empty());
+    const ResidentPages& pages = paper.scene->pager().residency().heights;
+    EXPECT_EQ(pages.corrections.at(static_cast<std::size_t>(pages.roots[0])),
+              test::corrections_of(stored_->terrain(), {0, 0, 0}));
+    EXPECT_LE(paper.scene->memory().resident_bytes, options.budget_bytes);
+}
+
+TEST_F(SceneOfHills, CullingByCornersLeavesTilesOut) {
+    const Camera camera = stored_->camera(200, 512);
+    SceneOptions options = small_options();
+    options.lod.culling = Culling::corners;
+    Staged staged(*stored_, options);
+    const auto frame = staged.scene->complete({&camera, 1});
+    ASSERT_TRUE(frame.ok());
+    EXPECT_GT(frame->selection->culled, 0);
+}
+
 TEST_F(SceneOfHills, CatchingUpDoesNotWaitForASlowDisk) {
     SceneOptions options = small_options();
     options.latency_ms = 1000;

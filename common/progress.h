@@ -1,5 +1,4 @@
-// Progress of a long job on stderr: percent, rate and time left. A terminal gets one line rewritten, a pipe plain
-// lines,
+// Progress of a long job on stderr: percent, rate and time left. A terminal gets one line rewritten, a pipe plain lines,
 // --quiet nothing. One thread reports.
 #pragma once
 

@@ -1,0 +1,445 @@
+#include "runtime/lod/page_mesher.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <vector>
+
+#include "runtime/lod/block_selection.h"
+#include "runtime/lod/cut.h"
+#include "runtime/lod/edge_agreement.h"
+#include "runtime/lod/reuse.h"
+#include "runtime/lod/tile_vertices.h"
+
+namespace scree {
+namespace {
+
+/// Rungs of block thresholds an octave: 8 cost 4 % of triangles on average; fewer cost more, more are left sooner.
+constexpr double kRungsPerOctave = 8;
+constexpr int kNoRung = std::numeric_limits<int>::min();
+constexpr int kLeastRung = kNoRung + 1;  ///< threshold 0: whatever has an error at all
+/// Above every error: an eye may stand so far off that its distance is infinite.
+constexpr double kGreatestThreshold_m = 1e30;
+/// Where meshes do not fit into the pool the tolerance grows by eighths of an octave.
+constexpr double kCoarsening = 1.0905077326652577;
+constexpr int kMostCoarsening = 16;  ///< two octaves: about a quarter of the triangles
+/// Eyes kept of a tile's last choice; with more views nothing is reused.
+constexpr std::size_t kMostEyes = 4;
+/// A height slot's share in the pool, of the 3 * 2 * m^2 indices of a tile with nothing dropped: what a quarter of them
+/// comes to where half of the slots are drawn. So many tiles have room for all.
+constexpr std::size_t kPoolShare = 8, kRoomyTiles = 64;
+
+// Where the vertices of a mesh were chosen for.
+struct Chosen {
+    bool valid = false;
+    std::int32_t geomip = -1;
+    std::uint32_t edge_mask = 0;
+    std::int32_t part_level = 0;
+    std::uint32_t seen_by = 0;
+    int rung = kNoRung;
+    double tau_px = 0, half_curvature = 0;
+    std::array<double, kMostEyes> error_px{};
+    std::array<glm::dvec3, kMostEyes> eyes{};
+};
+
+// What is kept of a height slot.
+struct SlotState {
+    Chosen chosen;
+    TileBorder own;      ///< of what was chosen
+    TileBorder drawn;    ///< with what neighbours added, of `mesh`
+    bool made = false;   ///< `mesh` is of what was chosen last and of `drawn`
+    bool whole = false;  ///< nothing is dropped: drawn by its pattern
+    MeshRange mesh;
+    std::vector<std::uint32_t> cell_starts;  ///< of its parts' cells in the mesh, Morton order, and the end
+};
+
+// A tile drawn in this frame.
+struct Drawn {
+    TileShape shape;
+    std::uint32_t seen_by = 0;
+    std::int32_t part_level = 0;  ///< the finest part that it is drawn in
+    Box box;
+    std::int64_t views = 0;
+};
+
+}  // namespace
+
+struct PageMesher::Impl {
+    Impl(const Dataset& d, const LodSettings& settings, std::int64_t height_slots, MeshPool& meshes)
+        : dataset(d),
+          lod(settings),
+          n(d.lattice.tile_cells_log2),
+          m(1 << n),
+          vertices(d, height_slots),
+          edges(d.lattice),
+          states(static_cast<std::size_t>(height_slots)),
+          chosen(states.size() * vertices.vertex_count()),
+          set(vertices.vertex_count()),
+          pool(meshes),
+          buffer(pool.largest_mesh()) {}
+
+    const Dataset dataset;  // a copy: the store may be updated under it
+    LodSettings lod;
+    int n, m;
+    TileVertices vertices;
+    EdgeAgreement edges;
+    std::vector<SlotState> states;
+    std::vector<std::uint8_t> chosen;  ///< by slot, an entry a vertex: selected for the tile's own sake
+    std::vector<std::uint8_t> set;     ///< a buffer: of one tile
+    MeshPool& pool;
+    std::vector<std::uint32_t> buffer;
+    MeshCounters counters;
+    std::vector<Drawn> tiles;  ///< of the frame, in the order of edges.tiles()
+    std::vector<std::int32_t> tile_of_slot;
+
+    SlotState& state_of(const Drawn& tile) { return states[static_cast<std::size_t>(tile.shape.slot)]; }
+    const SlotState& state_of(const Drawn& tile) const { return states[static_cast<std::size_t>(tile.shape.slot)]; }
+    std::uint8_t* chosen_of(const Drawn& tile) {
+        return chosen.data() + static_cast<std::size_t>(tile.shape.slot) * vertices.vertex_count();
+    }
+
+    void put(std::int32_t slot, std::span<const SlotVertex> from, std::span<const VertexCost> costs) {
+        vertices.put(slot, from, costs);
+        states[static_cast<std::size_t>(slot)] = {};
+    }
+
+    // --- the frame's tiles ---
+
+    void gather(std::span<const Camera> views, double half_curvature, const Residency& residency,
+                const Selection& selection) {
+        tiles.clear();
+        edges.tiles().clear();
+        tile_of_slot.assign(states.size(), -1);
+        for (std::size_t v = 0; v < selection.draws.size(); ++v)
+            for (const DrawItem& item : selection.draws[v]) {
+                std::int32_t& tile = tile_of_slot[static_cast<std::size_t>(item.height_slot)];
+                if (tile < 0) {
+                    tile = static_cast<std::int32_t>(tiles.size());
+                    const auto& header = residency.heights.headers[static_cast<std::size_t>(item.height_slot)];
+                    tiles.push_back({{item.height_slot, item.tile, item.geomip, item.edge_mask},
+                                     0,
+                                     0,
+                                     box_of(item.tile, header.own, views, half_curvature),
+                                     0});
+                    edges.tiles().push_back({item.tile, item.geomip, item.edge_mask, {}});
+                }
+                tiles[static_cast<std::size_t>(tile)].seen_by |= 1u << v;
+                ++tiles[static_cast<std::size_t>(tile)].views;
+            }
+        for (const DrawList& list : selection.parts)
+            for (const DrawItem& item : list) {
+                Drawn& tile = tiles[static_cast<std::size_t>(tile_of_slot[static_cast<std::size_t>(item.height_slot)])];
+                tile.part_level = std::max(tile.part_level, item.part.level);
+            }
+    }
+
+    // With all that the curvature lowers it by, for any of the views.
+    Box box_of(TileId id, const HeightBounds& bounds, std::span<const Camera> views, double half_curvature) const {
+        const Lattice& l = dataset.lattice;
+        const LatticePoint corner = l.corner(id);
+        const auto west = static_cast<double>(corner.i), north = static_cast<double>(corner.j),
+                   extent = static_cast<double>(l.tile_extent(id.level));
+        const Box box{{l.x_m(west), l.y_m(north + extent), dataset.height_m(bounds.min_n)},
+                      {l.x_m(west + extent), l.y_m(north), dataset.height_m(bounds.max_n)}};
+        Box low = box;
+        if (half_curvature > 0)
+            for (const Camera& view : views)
+                low.low.z = std::min(low.low.z, lowered_by_curvature(box, view.eye, half_curvature).low.z);
+        return low;
+    }
+
+    // --- the choice of a tile's own vertices ---
+
+    // The rung of a tile: what it may err by, over the views that see it.
+    int rung_of(const Drawn& tile, std::span<const Camera> views, double tau_px) const {
+        double threshold_m = std::numeric_limits<double>::infinity();
+        for (std::size_t v = 0; v < views.size(); ++v) {
+            if ((tile.seen_by >> v & 1) == 0) continue;
+            const Camera& view = views[v];
+            const double distance_m = std::max(distance_to_box(view.eye, tile.box), view.near_m);
+            threshold_m = std::min(threshold_m, tau_px * distance_m / (view.focal_px() * view.off_axis_factor()));
+        }
+        threshold_m = std::min(threshold_m, kGreatestThreshold_m);
+        if (!(threshold_m > 0)) return kLeastRung;
+        return static_cast<int>(std::floor(kRungsPerOctave * std::log2(threshold_m)));
+    }
+    static double threshold_of(int rung) { return rung == kLeastRung ? 0 : std::exp2(rung / kRungsPerOctave); }
+
+    bool same_shape(const Chosen& c, const Drawn& tile, const MeshSettings& s) const {
+        return c.valid && c.geomip == tile.shape.geomip && c.edge_mask == tile.shape.edge_mask &&
+               c.part_level == tile.part_level && c.half_curvature == s.half_curvature;
+    }
+
+    bool may_reuse(const Chosen& c, const Drawn& tile, std::span<const Camera> views, const MeshSettings& s) const {
+        if (lod.reuse == ReuseTest::off || !same_shape(c, tile, s) || views.size() > kMostEyes) return false;
+        if (c.tau_px != s.tau_px || (tile.seen_by & ~c.seen_by) != 0) return false;
+        for (std::size_t v = 0; v < views.size(); ++v) {
+            if ((tile.seen_by >> v & 1) == 0) continue;
+            if (!may_reuse(c.eyes[v], c.error_px[v], tile, views[v], s)) return false;
+        }
+        return true;
+    }
+
+    bool may_reuse(const glm::dvec3& then, double error_px, const Drawn& tile, const Camera& view,
+                   const MeshSettings& s) const {
+        const double now_px = view.focal_px() * view.off_axis_factor();
+        if (now_px > error_px) return false;
+        if (lod.reuse == ReuseTest::paper)
+            return reuse_p1(then, view.eye, corners_of(tile), tile.box, view.focal_px(), lod.s_px, s.tau_px);
+        const EyeToBox before = eye_to_box(then, tile.box), after = eye_to_box(view.eye, tile.box);
+        double moved_m = glm::length(view.eye - then);
+        // Relative to the eye, a point over a curved earth moves by more than the eye does.
+        if (s.half_curvature > 0) {
+            const double furthest_m = std::max(before.level_m, after.level_m) +
+                                      std::hypot(tile.box.high.x - tile.box.low.x, tile.box.high.y - tile.box.low.y);
+            moved_m *= 1 + (2 * furthest_m + moved_m) * s.half_curvature;
+        }
+        return reuse_exact(before, after, moved_m, kMetricFloor, {s.tau_px, lod.s_px});
+    }
+
+    std::array<glm::dvec3, 4> corners_of(const Drawn& tile) const {
+        const Box& box = tile.box;
+        const auto z = [&](int side, int k) { return vertices.height_m(tile.shape.slot, side_vertex(side, k, m)); };
+        return {{{box.low.x, box.high.y, z(0, 0)},
+                 {box.high.x, box.high.y, z(0, m)},
+                 {box.low.x, box.low.y, z(2, 0)},
+                 {box.high.x, box.low.y, z(2, m)}}};
+    }
+
+    // Parts of a tile are drawn apart: the lines between them must be edges.
+    void add_parts(const Drawn& tile, std::uint8_t* active) const {
+        const Bisection& b = vertices.bisection(tile.shape.tile);
+        const int stride = m >> tile.part_level;
+        for (int j = 0; tile.part_level > 0 && j <= m; j += stride)
+            for (int i = 0; i <= m; i += stride) add_closed(b, b.index(i, j), active);
+    }
+
+    void choose(const Drawn& tile, std::span<const Camera> views, const MeshSettings& s) {
+        SlotState& state = state_of(tile);
+        Chosen& c = state.chosen;
+        int rung = kNoRung;
+        if (lod.method == LodMethod::block_rsg) {
+            rung = rung_of(tile, views, s.tau_px);
+            if (rung == c.rung && same_shape(c, tile, s)) return;
+        } else if (may_reuse(c, tile, views, s)) {
+            return;
+        }
+        ++counters.chosen;
+        std::uint8_t* active = chosen_of(tile);
+        if (lod.method == LodMethod::block_rsg)
+            vertices.choose(tile.shape, threshold_of(rung), s.half_curvature, active);
+        else
+            choose_each(tile, views, s, active);
+        state.whole = vertices.complete_if_dense(tile.shape, active);
+        add_parts(tile, active);
+        state.own = edges.border_of(active);
+        state.made = false;
+        c = {true,
+             tile.shape.geomip,
+             tile.shape.edge_mask,
+             tile.part_level,
+             tile.seen_by,
+             rung,
+             s.tau_px,
+             s.half_curvature,
+             {},
+             {}};
+        for (std::size_t v = 0; v < std::min(views.size(), kMostEyes); ++v) {
+            c.eyes[v] = views[v].eye;
+            c.error_px[v] = views[v].focal_px() * views[v].off_axis_factor();
+        }
+    }
+
+    void choose_each(const Drawn& tile, std::span<const Camera> views, const MeshSettings& s, std::uint8_t* active) {
+        const bool paper = lod.metric == ErrorMetric::uc;
+        std::array<VertexEye, kMaxViews> eyes;
+        std::size_t count = 0;
+        for (std::size_t v = 0; v < views.size(); ++v)
+            if ((tile.seen_by >> v & 1) != 0)
+                eyes[count++] = {views[v].eye, views[v].focal_px() * (paper ? 1 : views[v].off_axis_factor())};
+        vertices.choose(tile.shape, std::span(eyes.data(), count), s.tau_px, s.half_curvature, paper, active);
+    }
+
+    // --- triangles ---
+
+    // Cell by cell of its parts, in Morton order.
+    void emit(std::size_t t) {
+        const Drawn& tile = tiles[t];
+        const TileBorder& border = edges.tiles()[t].border;
+        const Bisection& b = vertices.bisection(tile.shape.tile);
+        SlotState& state = state_of(tile);
+        std::memcpy(set.data(), chosen_of(tile), set.size());
+        edges.add_border(b, border, state.own, set.data());
+        std::uint32_t* out = buffer.data();
+        state.cell_starts.clear();
+        for_each_cell(tile.part_level, [&](int x, int y) {
+            if (tile.part_level > 0) state.cell_starts.push_back(static_cast<std::uint32_t>(out - buffer.data()));
+            for (const BisectionTriangle& root : b.roots(n - tile.part_level, x, y))
+                out = emit_triangles(b, set.data(), root, 2 * tile.part_level + 1, out);
+        });
+        const auto count = static_cast<std::size_t>(out - buffer.data());
+        if (tile.part_level > 0) state.cell_starts.push_back(static_cast<std::uint32_t>(count));
+        state.mesh = pool.put(std::span(buffer.data(), count));
+        state.drawn = border;
+        state.made = true;
+        ++counters.remade;
+    }
+
+    template <class Visit>
+    static void for_each_cell(int level, const Visit& visit) {
+        for (int code = 0; code < 1 << (2 * level); ++code) {
+            int x = 0, y = 0;
+            for (int bit = 0; bit < level; ++bit) {
+                x |= (code >> (2 * bit) & 1) << bit;
+                y |= (code >> (2 * bit + 1) & 1) << bit;
+            }
+            visit(x, y);
+        }
+    }
+
+    // False: they do not all fit.
+    bool make_meshes() {
+        if (make_missing()) return true;
+        // New ones have overwritten some that are still needed.
+        pool.clear();
+        return make_missing();
+    }
+
+    bool make_missing() {
+        for (std::size_t t = 0; t < tiles.size(); ++t)
+            if (!is_made(t)) emit(t);
+        for (std::size_t t = 0; t < tiles.size(); ++t)
+            if (!is_made(t)) return false;
+        return true;
+    }
+
+    bool is_made(std::size_t t) {
+        const SlotState& state = state_of(tiles[t]);
+        if (state.whole) return true;
+        return state.made && state.drawn == edges.tiles()[t].border && pool.holds(state.mesh);
+    }
+
+    void hand_over(Selection& selection) {
+        for (DrawList& list : selection.draws)
+            for (DrawItem& item : list) item.mesh = mesh_of(item);
+        for (DrawList& list : selection.parts)
+            for (DrawItem& item : list) item.mesh = part_of(item);
+        selection.triangles = 0;
+        for (const Drawn& tile : tiles) selection.triangles += tile.views * triangles_of(tile);
+        counters.triangles = selection.triangles;
+    }
+
+    MeshRange mesh_of(const DrawItem& item) const {
+        const SlotState& state = states[static_cast<std::size_t>(item.height_slot)];
+        return state.whole ? MeshRange{} : state.mesh;
+    }
+
+    std::int64_t triangles_of(const Drawn& tile) const {
+        const SlotState& state = state_of(tile);
+        return state.whole ? pattern_triangles(n, tile.shape.geomip, tile.shape.edge_mask) : state.mesh.count / 3;
+    }
+
+    // The cells of a part stand together.
+    MeshRange part_of(const DrawItem& item) const {
+        const SlotState& state = states[static_cast<std::size_t>(item.height_slot)];
+        if (state.whole || state.cell_starts.empty()) return mesh_of(item);
+        const int finer = std::countr_zero(state.cell_starts.size() - 1) / 2 - item.part.level;
+        std::size_t first = 0;
+        for (int bit = item.part.level; bit-- > 0;)
+            first = first << 2 | static_cast<std::size_t>(item.part.y >> bit & 1) << 1 |
+                    static_cast<std::size_t>(item.part.x >> bit & 1);
+        const std::size_t end = (first + 1) << (2 * finer);
+        first <<= 2 * finer;
+        return state.mesh.section(state.cell_starts[first], state.cell_starts[end] - state.cell_starts[first]);
+    }
+
+    void mesh(std::span<const Camera> views, const MeshSettings& settings, const Residency& residency,
+              Selection& selection) {
+        counters = {};
+        MeshSettings s = settings;
+        // Where the budget holds the cut coarse, finer vertices within its tiles would not be seen for what they are.
+        s.tau_px = std::max(s.tau_px, selection.tau_effective_px / kCutShare);
+        gather(views, s.half_curvature, residency, selection);
+        counters.tiles = static_cast<std::int64_t>(tiles.size());
+        edges.link();
+        const double asked_px = s.tau_px;
+        bool fits = choose_and_make(views, s);
+        for (int step = 0; !fits && step < kMostCoarsening; ++step) {
+            s.tau_px = std::max(s.tau_px, 1.0 / 1024) * kCoarsening;
+            fits = choose_and_make(views, s);
+        }
+        if (!fits) {
+            // Eyes in the balls of high peaks want all vertices at any tolerance. Patterns need no pool and keep what
+            // was asked; the selection says already how many triangles they are and how far off.
+            selection.tau_effective_px = asked_px;
+            counters.triangles = selection.triangles;
+            return;
+        }
+        selection.budget_limited = selection.budget_limited || s.tau_px > asked_px;
+        hand_over(selection);
+        selection.tau_effective_px = s.tau_px;
+        selection.max_bound_px = std::max(selection.max_bound_px, lod.promise_px(s.tau_px));
+        selection.mean_bound_px = std::max(selection.mean_bound_px, lod.promise_px(s.tau_px));
+    }
+
+    bool choose_and_make(std::span<const Camera> views, const MeshSettings& s) {
+        for (const Drawn& tile : tiles) choose(tile, views, s);
+        for (std::size_t t = 0; t < tiles.size(); ++t) edges.tiles()[t].border = state_of(tiles[t]).own;
+        edges.agree();
+        return make_meshes();
+    }
+};
+
+namespace {
+
+/// The pool stands here and, shorter, in the renderer.
+constexpr std::size_t kIndexBytes = 2 * sizeof(std::uint32_t);
+
+std::size_t most_indices(const Dataset& dataset) {
+    const std::size_t cells = std::size_t{1} << dataset.lattice.tile_cells_log2;
+    return 6 * cells * cells;
+}
+
+MeshPool pool_of(const Dataset& dataset, std::int64_t height_slots) {
+    const std::size_t most = most_indices(dataset);
+    const auto slots = static_cast<std::size_t>(height_slots);
+    return MeshPool(std::max(slots * most / kPoolShare, std::min(slots, kRoomyTiles) * most), most);
+}
+
+}  // namespace
+
+PageMesher::PageMesher(const Dataset& dataset, const LodSettings& lod, std::int64_t height_slots)
+    : pool_(pool_of(dataset, height_slots)), impl_(std::make_unique<Impl>(dataset, lod, height_slots, pool_)) {}
+
+void PageMesher::renew(const Dataset& dataset, std::int64_t height_slots) {
+    pool_ = pool_of(dataset, height_slots);
+    impl_ = std::make_unique<Impl>(dataset, impl_->lod, height_slots, pool_);
+}
+
+PageMesher::~PageMesher() = default;
+
+void PageMesher::put(std::int32_t slot, std::span<const SlotVertex> vertices, std::span<const VertexCost> costs) {
+    impl_->put(slot, vertices, costs);
+}
+
+void PageMesher::mesh(std::span<const Camera> views, const MeshSettings& settings, const Residency& residency,
+                      Selection& selection) {
+    impl_->mesh(views, settings, residency, selection);
+}
+
+const MeshCounters& PageMesher::counters() const { return impl_->counters; }
+
+std::int64_t PageMesher::slot_cost(const Dataset& dataset) {
+    const std::size_t vertices = slot_vertex_count(dataset.lattice.tile_cells_log2);
+    return TileVertices::slot_cost(dataset) + EdgeAgreement::slot_cost() +
+           static_cast<std::int64_t>(vertices + most_indices(dataset) / kPoolShare * kIndexBytes + sizeof(SlotState) +
+                                     sizeof(Drawn));
+}
+
+std::int64_t PageMesher::fixed_cost(const Dataset& dataset) {
+    return static_cast<std::int64_t>(kRoomyTiles * most_indices(dataset) * kIndexBytes);
+}
+
+}  // namespace scree
