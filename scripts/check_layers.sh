@@ -45,12 +45,17 @@ below_render='runtime/view runtime/paging runtime/lod'
 forbid common 'tools/|runtime/' "common/ includes neither tools/ nor runtime/:"
 forbid common "$opengl|$window|$images|$proj" "common/ sees no OpenGL, no window, no image library, no PROJ:"
 forbid "common/mesh common/store" 'common/query/' "common/mesh and common/store lie below common/query:"
+forbid "common/mesh common/store common/query" 'common/cli/|common/c_api/' "common/cli and c_api lie above the rest of common:"
 forbid tools 'runtime/' "tools/ and runtime/ never meet:"
 forbid runtime 'tools/' "runtime/ and tools/ never meet:"
 forbid "common tools runtime" 'experiments/' "experiments/ is included by nothing but its tests:"
-forbid "$below_render" 'runtime/render/|runtime/app/' "runtime/view, paging and lod lie below render and app:"
-forbid "$below_render" "$window" "runtime/view, paging and lod know no window:"
-forbid runtime/render 'runtime/app/' "runtime/render lies below app:"
+forbid "$below_render" 'runtime/render/|runtime/scene/|runtime/app/' \
+    "runtime/view, paging and lod lie below scene, render and app:"
+forbid "$below_render runtime/scene" "$window" "runtime/view, paging, lod and scene know no window:"
+forbid runtime/render 'runtime/scene/|runtime/app/' "runtime/render lies below scene_renderer and app:"
+forbid runtime/scene 'runtime/app/' "runtime/scene lies below app:"
+forbid runtime/scene 'runtime/render/' "of runtime/scene, scene_renderer alone knows the renderer:" \
+    'runtime/scene/scene_renderer\.'
 forbid "tools runtime" "$opengl" "OpenGL and EGL headers stand in runtime/render alone:" 'runtime/render/'
 forbid tools "$window" "tools/ knows no window:"
 forbid "tools runtime" "$images" "OpenImageIO, libgeotiff and libtiff stand in tools/source alone:" 'tools/source/'

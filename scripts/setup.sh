@@ -5,7 +5,7 @@ set -euo pipefail
 
 packages=(
     # building
-    ca-certificates cmake g++ git ninja-build pkg-config
+    ca-certificates cmake dpkg-dev g++ git ninja-build pkg-config
     # both programs
     libcli11-dev libfmt-dev libsqlite3-dev libssl-dev libxxhash-dev libzstd-dev nlohmann-json3-dev
     # scree: images in, georeference and CRS (libproj-dev brings the registry, proj-data), the pipeline
@@ -13,7 +13,7 @@ packages=(
     # scree-view: the window, headless OpenGL with Mesa's software driver, pictures out
     libegl-dev libegl-mesa0 libepoxy-dev libgl1-mesa-dri libglfw3-dev libglm-dev libimgui-dev libpng-dev
     # tests; a virtual display for those of the window
-    imagemagick libgtest-dev libstb-dev xauth xdotool xvfb
+    groff-base imagemagick libgtest-dev libstb-dev xauth xdotool xvfb
     # benches, and the encoders they measure against
     libbenchmark-dev libsquish-dev
 )

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "common/cli/arguments.h"
 #include "common/report.h"
 #include "runtime/app/audit.h"
 #include "runtime/app/commands.h"
@@ -190,14 +191,16 @@ int run_audit(int argc, char** argv) {
     AuditOptions a;
     add_view_options(app, o);
     app.add_option("--path", o.path,
-                   "CSV of eye_x,eye_y,eye_z,look_x,look_y,look_z; default: a low, a high and a steep part");
+                   "CSV of eye_x,eye_y,eye_z,look_x,look_y,look_z; default: a low, a high and a steep part")
+        ->type_name("FILE");
     app.add_option("--frames", a.frames, "Poses along the path")->capture_default_str()->check(CLI::Range(1, 1000000));
     app.add_flag(
         "--moving", a.moving,
         "Do not wait for tiles: judge each frame as a flight draws it, stand-ins and growing tiles included, by "
         "the bound it states");
     auto* against = app.add_option("--against", a.against,
-                                   "Also judge by the DEMs themselves, read by `scree samples`: every sample in view");
+                                   "Also judge by the DEMs themselves, read by `scree samples`: every sample in view")
+                        ->type_name("PATH");
     app.add_option("--assume-crs", a.sampling.assume_crs, "As for scree build")->needs(against);
     app.add_flag("--assume-same-datum", a.sampling.assume_same_datum, "As for scree build")->needs(against);
     app.add_option("--spacing", a.sampling.spacing_m, "As for scree build, of sources without georeference")

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "common/cli/arguments.h"
 #include "common/report.h"
 #include "runtime/app/commands.h"
 #include "runtime/app/comparison_page.h"
@@ -229,7 +230,8 @@ int run_compare(int argc, char** argv) {
     CompareOptions c;
     add_view_options(app, o);
     app.add_option("--path", o.path,
-                   "CSV of eye_x,eye_y,eye_z,look_x,look_y,look_z; default: a low, a high and a steep part");
+                   "CSV of eye_x,eye_y,eye_z,look_x,look_y,look_z; default: a low, a high and a steep part")
+        ->type_name("FILE");
     app.add_option("--frames", c.frames, "Poses along the path: more say more of the store, and take longer")
         ->capture_default_str()
         ->check(CLI::Range(1, 10000));
@@ -241,9 +243,10 @@ int run_compare(int argc, char** argv) {
     app.add_option("--taus", c.tau_px, "Tolerances of the methods, pixels, separated by commas")
         ->delimiter(',')
         ->capture_default_str();
-    app.add_option("--report", c.report, "Write index.html, comparison.csv and comparison.json into this new folder");
+    app.add_option("--report", c.report, "Write index.html, comparison.csv and comparison.json into this new folder")
+        ->type_name("DIR");
     app.add_flag("--force", c.force, "Replace an earlier report");
-    app.add_option("--csv", c.csv, "Write a line a case, or - for standard output");
+    app.add_option("--csv", c.csv, "Write a line a case, or - for standard output")->type_name("FILE|-");
     auto* recommended =
         app.add_flag("--recommend", c.recommended, "Print the command line that fits --fps and --max-error best");
     app.add_option("--fps", c.wish.fps, "Frames a second that 99 of 100 frames must make")

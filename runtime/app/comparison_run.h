@@ -7,7 +7,7 @@
 
 #include "common/store/sqlite_store.h"
 #include "runtime/app/comparison.h"
-#include "runtime/app/scene.h"
+#include "runtime/scene/scene.h"
 #include "runtime/view/flight_path.h"
 
 namespace scree {

@@ -1,13 +1,12 @@
-// Display: a context, a renderer and a target for one scene, with or without a window; the sink that tiles arrive in.
+// Display: a context of our own, with or without a window, and targets for one scene; the sink that tiles arrive in.
 #pragma once
 
 #include <memory>
 #include <span>
 
 #include "runtime/app/cpu_arena.h"
-#include "runtime/app/scene.h"
 #include "runtime/render/context.h"
-#include "runtime/render/renderer.h"
+#include "runtime/scene/scene_renderer.h"
 
 namespace scree {
 
@@ -30,12 +29,12 @@ public:
     void put_texture(std::int32_t slot, std::span<const std::uint8_t> chain) override;
 
     GlContext& context() { return *context_; }
-    Renderer& renderer() { return *renderer_; }
+    Renderer& renderer() { return terrain_->renderer(); }
     RenderTarget& target() { return *target_; }
     /// Of tile memory, as taken by OpenGL.
-    std::size_t arena_bytes() const { return arena_bytes_; }
+    std::size_t arena_bytes() const { return terrain_->arena_bytes(); }
     const CpuArena* arena() const { return arena_.get(); }
-    FrameSettings& frame_settings() { return settings_; }
+    FrameSettings& frame_settings() { return terrain_->settings(); }
     Result<void> resize(int width_px, int height_px);
     /// A second picture of the same tiles, in a target of its own.
     RenderTarget& inset() { return *inset_; }
@@ -47,22 +46,11 @@ public:
 
 private:
     Display() = default;
-    Result<void> make_renderer(const Dataset& dataset, const MemoryPlan& plan);
-    FrameTimes draw_into(RenderTarget& target, const Camera& camera, const DrawList& draws, double half_curvature);
-    void pass_meshes_on();
     std::unique_ptr<GlContext> context_;  // goes last
-    std::unique_ptr<Renderer> renderer_;
+    std::unique_ptr<SceneRenderer> terrain_;
     std::unique_ptr<RenderTarget> target_, inset_;
     std::unique_ptr<CpuArena> arena_;
-    const MeshPool* meshes_ = nullptr;    ///< the scene's
-    std::uint64_t meshes_passed_on_ = 0;  ///< MeshPool::written() of what the renderer has
-    FrameSettings settings_;
     int samples_ = 0;
-    std::size_t arena_bytes_ = 0;
-    RendererOptions renderer_options_;
 };
-
-/// Haze, sun and ground plane that suit a dataset's size.
-FrameSettings scenery(const Dataset& dataset);
 
 }  // namespace scree

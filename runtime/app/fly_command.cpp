@@ -4,17 +4,18 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "common/cli/arguments.h"
 #include "common/process_usage.h"
 #include "common/query/ground.h"
 #include "common/report.h"
 #include "runtime/app/commands.h"
 #include "runtime/app/coverage.h"
 #include "runtime/app/display.h"
-#include "runtime/app/frame_governor.h"
 #include "runtime/app/see_through.h"
 #include "runtime/app/statistics.h"
 #include "runtime/app/view_options.h"
 #include "runtime/render/png.h"
+#include "runtime/scene/frame_governor.h"
 
 namespace scree {
 namespace {
@@ -344,8 +345,10 @@ int run_fly(int argc, char** argv) {
     ViewOptions o;
     FlyOptions f;
     add_view_options(app, o);
-    auto* path = app.add_option(
-        "--path", o.path, "CSV of eye_x,eye_y,eye_z,look_x,look_y,look_z; default: a low, a high and a steep part");
+    auto* path =
+        app.add_option("--path", o.path,
+                       "CSV of eye_x,eye_y,eye_z,look_x,look_y,look_z; default: a low, a high and a steep part")
+            ->type_name("FILE");
     app.add_option("--roam", f.roam, "Instead: a restless flight with leaps, the same for the same number")
         ->excludes(path);
     app.add_option("--frames", f.frames, "Poses along the path")->capture_default_str()->check(CLI::Range(1, 10000000));
@@ -362,8 +365,8 @@ int run_fly(int argc, char** argv) {
                  "Draw each frame again over magenta and count pixels that show it where there is ground");
     app.add_option("--latency", f.latency_ms, "Delay every read by so many ms, to try a slow disk")
         ->check(CLI::Range(0, 60000));
-    app.add_option("--csv", f.csv, "Write one line a frame");
-    app.add_option("--last-frame", f.last_frame, "Write the last frame as PNG");
+    app.add_option("--csv", f.csv, "Write one line a frame")->type_name("FILE");
+    app.add_option("--last-frame", f.last_frame, "Write the last frame as PNG")->type_name("FILE");
     if (const int code = parse_arguments(app, argc, argv); code >= 0) return code;
     if (auto ok = check_view_options(o); !ok) return report_error("scree-view fly", ok.error());
     install_interrupt_handler();

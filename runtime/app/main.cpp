@@ -7,7 +7,9 @@
 #include <new>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "common/cli/completion.h"
 #include "common/report.h"
 #include "runtime/app/commands.h"
 
@@ -24,8 +26,23 @@ constexpr std::array<Command, 5> kCommands{{{"view", scree::run_view},
                                             {"audit", scree::run_audit},
                                             {"compare", scree::run_compare}}};
 
+// For the build, which installs what this prints.
+int print_completion() {
+    std::vector<std::string> words;
+    for (const Command& c : kCommands) words.emplace_back(c.name);
+    fmt::print("{}", scree::completion_head("scree-view", words, true));
+    std::string name = "scree-view", flag = "--completion-case";
+    std::array<char*, 3> arguments{name.data(), flag.data(), nullptr};
+    for (const Command& c : kCommands)
+        if (c.run != scree::run_view) c.run(2, arguments.data());
+    scree::run_view(2, arguments.data());  // all others
+    fmt::print("{}", scree::completion_tail("scree-view"));
+    return 0;
+}
+
 int dispatch(int argc, char** argv) {
     const std::string_view name = argc > 1 ? argv[1] : "";
+    if (name == "--completion") return print_completion();
     for (const Command& c : kCommands)
         if (c.name == name) return c.run(argc - 1, argv + 1);
     return scree::run_view(argc, argv);

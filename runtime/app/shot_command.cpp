@@ -3,6 +3,7 @@
 #include <charconv>
 #include <nlohmann/json.hpp>
 
+#include "common/cli/arguments.h"
 #include "common/report.h"
 #include "runtime/app/commands.h"
 #include "runtime/app/display.h"
@@ -80,11 +81,12 @@ int run_shot(int argc, char** argv) {
     std::string out, mesh, eye, look;
     FrameSettings debug;
     add_view_options(app, o);
-    app.add_option("-o,--output", out, "The PNG to write")->required();
+    app.add_option("-o,--output", out, "The PNG to write")->required()->type_name("FILE");
     auto* eye_option =
         app.add_option("--eye", eye, "X,Y,Z of the camera, metres in the dataset's CRS; default: an overview");
     app.add_option("--look", look, "X,Y,Z that it looks at")->needs(eye_option);
-    app.add_option("--mesh", mesh, "Also write the drawn triangles as a binary PLY in the dataset's coordinates");
+    app.add_option("--mesh", mesh, "Also write the drawn triangles as a binary PLY in the dataset's coordinates")
+        ->type_name("FILE");
     app.add_flag("--wireframe", debug.wireframe, "Draw edges only");
     app.add_flag("--colour-by-level", debug.colour_by_level, "Tint each tile by its level");
     app.add_flag("--magenta", debug.magenta_background, "No sky: what is not terrain is pure magenta");

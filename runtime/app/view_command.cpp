@@ -5,14 +5,15 @@
 #include <cmath>
 #include <filesystem>
 
+#include "common/cli/arguments.h"
 #include "common/report.h"
 #include "runtime/app/commands.h"
 #include "runtime/app/display.h"
 #include "runtime/app/fly_controls.h"
-#include "runtime/app/frame_governor.h"
 #include "runtime/app/ground_probe.h"
 #include "runtime/app/hud.h"
 #include "runtime/app/view_options.h"
+#include "runtime/scene/frame_governor.h"
 
 namespace scree {
 namespace {
@@ -202,7 +203,10 @@ int run_view(int argc, char** argv) {
     app.add_option("--tau-max", w.tau_most_px, "With --fps: never coarser than this")->capture_default_str();
     app.add_option("--seconds", w.seconds, "Close after so long; 0: stay open")->capture_default_str();
     app.set_version_flag("--version", std::string("scree-view ") + SCREE_VERSION);
-    if (const int code = parse_arguments(app, argc, argv); code >= 0) return code;
+    if (const int code = parse_arguments(
+            app, argc, argv, {"scree-view-audit", "scree-view-compare", "scree-view-fly", "scree-view-shot"});
+        code >= 0)
+        return code;
     if (auto ok = check_view_options(o); !ok) return report_error("scree-view", ok.error());
     install_interrupt_handler();
     if (auto ok = view(o, w); !ok) return report_error("scree-view", ok.error());

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "common/cli/arguments.h"
 #include "common/report.h"
 
 namespace scree {
@@ -20,27 +21,34 @@ void add_view_options(CLI::App& app, ViewOptions& o) {
     app.add_option("--budget", o.budget, "Ceiling of tile memory, such as 256M")->capture_default_str();
     app.add_option("--curvature", o.curvature_text,
                    "Lower what is far away as the earth does: auto (where it shows), on, off")
+        ->type_name("auto|on|off")
         ->capture_default_str();
     app.add_flag("--no-morph", o.no_morph, "Draw discrete levels: nothing moves, changes pop");
     add_lod_options(app, o.lod_options);
-    app.add_option("--json", o.json, "Write the report as JSON to a file, or - for standard output");
+    add_json_option(app, o.json);
 }
 
 void add_lod_options(CLI::App& app, LodOptions& o) {
     app.add_option("--lod", o.lod, "What decides density: geomip (a stride a tile), rsg (vertex by vertex), block-rsg")
+        ->type_name("geomip|rsg|block-rsg")
         ->capture_default_str();
     app.add_option(
            "--metric", o.metric,
            "guaranteed (nothing errs by more than tau), or as the papers have it and without a bound: uc, deboer")
+        ->type_name("guaranteed|uc|deboer")
         ->capture_default_str();
     app.add_option(
            "--cache", o.cache,
            "With --lod rsg, keep meshes while the eye moves: off, exact (errs by up to tau + s), paper (no bound)")
+        ->type_name("off|exact|paper")
         ->capture_default_str();
     app.add_option("--s", o.s_px, "With --cache, pixels beyond tau: larger keeps meshes longer, and errs by more")
         ->capture_default_str();
-    app.add_option("--cull", o.cull, "box, or corners (as published: loses tiles)")->capture_default_str();
+    app.add_option("--cull", o.cull, "box, or corners (as published: loses tiles)")
+        ->type_name("box|corners")
+        ->capture_default_str();
     app.add_option("--cracks", o.cracks, "stitch, or with --lod rsg dike (as published: strips between blocks)")
+        ->type_name("stitch|dike")
         ->capture_default_str();
 }
 
@@ -89,15 +97,6 @@ Result<FlightPath> flight_of(const TileStore& store, const ViewOptions& o, int f
     auto path = read_flight_path(*o.path);
     if (!path) return path;
     return resample(*path, frames);
-}
-
-int parse_arguments(CLI::App& app, int argc, char** argv) {
-    try {
-        app.parse(argc, argv);
-    } catch (const CLI::ParseError& error) {
-        return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorCode::usage);
-    }
-    return -1;
 }
 
 }  // namespace scree

@@ -6,7 +6,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "runtime/app/scene.h"
+#include "runtime/scene/scene.h"
 #include "runtime/view/camera.h"
 #include "runtime/view/flight_path.h"
 
@@ -41,7 +41,5 @@ SceneOptions scene_options(const ViewOptions& options);
 Result<Camera> camera_of(const FlightPose& pose, const ViewOptions& options);
 /// --path, or the default flight, with `frames` poses.
 Result<FlightPath> flight_of(const TileStore& store, const ViewOptions& options, int frames);
-/// Parses argv; -1 to go on, else the exit code.
-int parse_arguments(CLI::App& app, int argc, char** argv);
 
 }  // namespace scree

@@ -13,6 +13,13 @@ std::string gl_string(GLenum name) {
 
 bool contains(const std::string& text, const char* part) { return text.find(part) != std::string::npos; }
 
+class BorrowedContext final : public GlContext {
+public:
+    GLFWwindow* window() const override { return nullptr; }
+    void swap_buffers() override {}
+    Result<void> open() { return inspect(); }
+};
+
 }  // namespace
 
 Result<void> GlContext::inspect() {
@@ -28,6 +35,12 @@ Result<void> GlContext::inspect() {
             return Error{ErrorCode::display, fmt::format("{} lacks {}, without which it cannot draw compressed imagery",
                                                          renderer_, extension)};
     return {};
+}
+
+Result<std::unique_ptr<GlContext>> borrow_current_context() {
+    auto context = std::make_unique<BorrowedContext>();
+    if (const Result<void> opened = context->open(); !opened) return opened.error();
+    return std::unique_ptr<GlContext>(std::move(context));
 }
 
 }  // namespace scree

@@ -24,10 +24,10 @@ public:
     /// Drawn by the CPU: options that cost much there (anisotropy, multisampling) are best left off.
     bool is_software() const { return is_software_; }
 
-    /// Null without a window.
+    /// Null without a window of our own.
     virtual GLFWwindow* window() const = 0;
     /// Shows what was blitted to the window; waits for the display's refresh if WindowOptions says so. Nothing without
-    /// a window.
+    /// a window of our own.
     virtual void swap_buffers() = 0;
 
 protected:
@@ -41,21 +41,13 @@ private:
     bool is_software_ = false;
 };
 
-struct WindowOptions {
-    std::string title = "Scree";
-    int width_px = 1280;
-    int height_px = 800;
-    bool wait_for_refresh = true;  ///< off: as many frames as the machine gives, for measuring; the picture may tear
-    bool visible = true;
-};
-
 /// A context that draws into RenderTargets only. Prefers a GPU; LIBGL_ALWAYS_SOFTWARE=1 in the environment prefers the
 /// CPU, whose pictures are the same on every machine. Errors (ErrorCode::display): no EGL, no OpenGL 4.5, an extension
 /// missing.
 Result<std::unique_ptr<GlContext>> create_headless_context();
 
-/// One window at a time. The window's own framebuffer has no depth: draw into a RenderTarget and blit. Errors
-/// (ErrorCode::display): no display, no OpenGL 4.5, an extension missing.
-Result<std::unique_ptr<GlContext>> create_window_context(const WindowOptions& options);
+/// The context that is current on this thread, which somebody else made and keeps: it must outlive all that is created
+/// under it. Without any, libepoxy ends the process. Errors (ErrorCode::display): no OpenGL 4.5, an extension missing.
+Result<std::unique_ptr<GlContext>> borrow_current_context();
 
 }  // namespace scree

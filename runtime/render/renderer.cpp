@@ -396,4 +396,17 @@ std::uint32_t Renderer::warm_up(const FrameSettings& settings, RenderTarget& tar
     return static_cast<std::uint32_t>(std::popcount(kinds));
 }
 
+void Renderer::reset_state() {
+    glBindFramebuffer(GL_FRAMEBUFFER, 0);
+    glClipControl(GL_LOWER_LEFT, GL_NEGATIVE_ONE_TO_ONE);
+    glDisable(GL_FRAMEBUFFER_SRGB);
+    glDisable(GL_DEPTH_TEST);
+    glDepthFunc(GL_LESS);
+    glDisable(GL_CULL_FACE);
+    glUseProgram(0);
+    glBindVertexArray(0);
+    glBindBuffer(GL_DRAW_INDIRECT_BUFFER, 0);
+    glPixelStorei(GL_PACK_ALIGNMENT, 4);
+}
+
 }  // namespace scree

@@ -87,6 +87,7 @@ public:
     /// the meshes are drawn. What was drawn before keeps the old ones.
     void upload_mesh(std::uint32_t first, std::span<const std::uint32_t> indices);
 
+    /// Takes state that it does not set (masks, stencil, polygon offset) for OpenGL's initial one.
     /// Clears `target`, draws `items` (slots uploaded before; at most max_draws) and the sky. The camera's size is the
     /// target's.
     FrameTimes draw(const Camera& camera, std::span<const DrawItem> items, const FrameSettings& settings,
@@ -96,6 +97,10 @@ public:
     /// that compile at the first draw (software OpenGL: up to half a second, unless it kept the result of an earlier
     /// run) then do so now and not in mid-flight. What it draws means nothing.
     std::uint32_t warm_up(const FrameSettings& settings, RenderTarget& target);
+
+    /// Puts the state of the context that draw() and RenderTarget's readings and blits change back to OpenGL's initial
+    /// one, for programs that draw things of their own; the viewport and what texture units hold excepted.
+    static void reset_state();
 
 private:
     struct State;

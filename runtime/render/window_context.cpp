@@ -1,8 +1,8 @@
+#include "runtime/render/window_context.h"
+
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
 #include <fmt/format.h>
-
-#include "runtime/render/context.h"
 
 namespace scree {
 namespace {

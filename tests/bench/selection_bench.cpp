@@ -8,7 +8,7 @@
 #include <cstdlib>
 #include <thread>
 
-#include "runtime/app/scene.h"
+#include "runtime/scene/scene.h"
 #include "runtime/app/statistics.h"
 #include "runtime/view/flight_path.h"
 

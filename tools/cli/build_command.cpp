@@ -7,6 +7,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "common/cli/arguments.h"
 #include "common/report.h"
 #include "tools/cli/dataset_label.h"
 #include "tools/cli/height_options.h"
@@ -52,8 +53,9 @@ int run_build(int argc, char** argv) {
         ->required()
         ->expected(1, -1);
     app.add_option("--imagery", options.images, "Colour images: files and folders, in any CRS; later ones lie on top")
-        ->expected(1, -1);
-    app.add_option("-o,--output", options.out, "The store to write")->required();
+        ->expected(1, -1)
+        ->type_name("PATH");
+    app.add_option("-o,--output", options.out, "The store to write")->required()->type_name("FILE");
     add_height_options(app, options);
     app.add_option(
         "--crs", options.crs,
@@ -62,9 +64,11 @@ int run_build(int argc, char** argv) {
     app.add_option("--assume-crs", options.assume_crs, "CRS of files that name none");
     app.add_flag("--assume-same-datum", options.assume_same_datum, "Take heights above different datums as they are");
     app.add_option("--resampling", options.kernel, "Where samples are not lattice points: nearest, bilinear or cubic")
-        ->transform(CLI::CheckedTransformer(kKernels, CLI::ignore_case))
+        ->transform(CLI::CheckedTransformer(kKernels, CLI::ignore_case).description(""))
+        ->type_name("nearest|bilinear|cubic")
         ->default_str("bilinear");
     app.add_option("--fill", fill, "Interior voids of the heights: smooth, none, or a height in metres")
+        ->type_name("smooth|none|METRES")
         ->capture_default_str();
     app.add_option("--bands", options.colours.bands, "Bands shown as red, green, blue, or as grey: 3,2,1")
         ->delimiter(',');
@@ -81,7 +85,8 @@ int run_build(int argc, char** argv) {
         ->capture_default_str();
     app.add_option("--texture-quality", options.texture_quality,
                    "DXT1: normal, or high for 0.2 to 0.9 dB more at a fifteenth of the speed")
-        ->transform(CLI::CheckedTransformer(kTextureQualities, CLI::ignore_case))
+        ->transform(CLI::CheckedTransformer(kTextureQualities, CLI::ignore_case).description(""))
+        ->type_name("normal|high")
         ->default_str("normal");
     app.add_option("--height-quantum", options.height_quantum_m,
                    "Metres of the height unit; default: the source's own for integers, 1/64 m otherwise");
@@ -91,12 +96,8 @@ int run_build(int argc, char** argv) {
     app.add_flag("--force", options.force, "Replace an existing OUT");
     app.add_flag("--dry-run", dry_run, "Check the inputs and say what would be built");
     app.add_flag("--quiet", options.quiet, "No progress");
-    app.add_option("--json", json, "Write the report as JSON to a file, or - for standard output");
-    try {
-        app.parse(argc, argv);
-    } catch (const CLI::ParseError& error) {
-        return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorCode::usage);
-    }
+    add_json_option(app, json);
+    if (const int code = parse_arguments(app, argc, argv); code >= 0) return code;
     auto rule = parse_fill(fill);
     if (!rule) return report_error("scree build", rule.error());
     options.fill = *rule;

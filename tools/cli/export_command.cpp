@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "common/cli/arguments.h"
 #include "common/report.h"
 #include "common/store/byte_io.h"
 #include "common/store/sqlite_store.h"
@@ -154,12 +155,15 @@ int run_export(int argc, char** argv) {
     auto* const what = app.add_option_group("What", "What to write");
     auto* const heights_option = what->add_option(
         "--heights", heights, "Heights as GeoTIFF of points: integers where all are whole metres, else floats");
-    auto* const imagery_option = what->add_option("--imagery", imagery, "Texels as GeoTIFF of areas, RGBA");
+    heights_option->type_name("FILE");
+    auto* const imagery_option =
+        what->add_option("--imagery", imagery, "Texels as GeoTIFF of areas, RGBA")->type_name("FILE");
     auto* const texture_option =
         what->add_option("--texture", texture, "Texture tile LEVEL/X/Y as DDS (DXT1 with its mips)");
     what->require_option(1);
-    auto* const output_option =
-        app.add_option("-o,--output", out, "The file to write a texture tile to")->needs(texture_option);
+    auto* const output_option = app.add_option("-o,--output", out, "The file to write a texture tile to")
+                                    ->type_name("FILE")
+                                    ->needs(texture_option);
     texture_option->needs(output_option);
     auto* const box_option =
         app.add_option("--box", box, "XMIN,YMIN,XMAX,YMAX in metres in the store's CRS; default: everything")
@@ -175,12 +179,8 @@ int run_export(int argc, char** argv) {
             ->excludes(level_option);
     app.add_flag("--force", options.force, "Replace existing files");
     app.add_flag("--quiet", options.quiet, "No progress");
-    app.add_option("--json", json, "Write the report as JSON to a file, or - for standard output");
-    try {
-        app.parse(argc, argv);
-    } catch (const CLI::ParseError& error) {
-        return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorCode::usage);
-    }
+    add_json_option(app, json);
+    if (const int code = parse_arguments(app, argc, argv); code >= 0) return code;
     Result<std::string> report = std::string();
     if (*texture_option) {
         report = export_texture(path, texture, out, options.force);

@@ -10,6 +10,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "common/cli/arguments.h"
 #include "common/query/ground.h"
 #include "common/report.h"
 #include "common/store/sqlite_store.h"
@@ -190,15 +191,11 @@ int run_height(int argc, char** argv) {
         ->expected(6)
         ->allow_extra_args(false)
         ->type_name("NUMBER");
-    app.add_option("--json", json, "Write the report as JSON to a file, or - for standard output")->type_name("FILE|-");
+    add_json_option(app, json);
     std::vector<std::string> texts;
     std::vector<char*> arguments;
     write_out_leading_zeros(argc, argv, texts, arguments);
-    try {
-        app.parse(argc, arguments.data());
-    } catch (const CLI::ParseError& error) {
-        return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorCode::usage);
-    }
+    if (const int code = parse_arguments(app, argc, arguments.data()); code >= 0) return code;
     const auto questions = questions_of(coordinates, file, ray);
     if (!questions) return report_error("scree height", questions.error());
     auto store = SqliteStore::open(path);

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "common/cli/arguments.h"
 #include "common/report.h"
 #include "common/store/sqlite_store.h"
 #include "tools/cli/dataset_label.h"
@@ -59,12 +60,8 @@ int run_info(int argc, char** argv) {
     bool with_digest = false;
     app.add_option("STORE", path, "A .scree file")->required();
     app.add_flag("--digest", with_digest, "Also the SHA-256 of the contents (reads everything)");
-    app.add_option("--json", json, "Write the report as JSON to a file, or - for standard output");
-    try {
-        app.parse(argc, argv);
-    } catch (const CLI::ParseError& error) {
-        return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorCode::usage);
-    }
+    add_json_option(app, json);
+    if (const int code = parse_arguments(app, argc, argv); code >= 0) return code;
     auto store = SqliteStore::open(path);
     if (!store) return report_error("scree info", store.error());
     auto contents = (*store)->contents();

@@ -6,7 +6,10 @@
 #include <new>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "common/cli/completion.h"
+#include "common/cli/man_page.h"
 #include "common/report.h"
 #include "tools/cli/build_command.h"
 #include "tools/cli/export_command.h"
@@ -43,6 +46,26 @@ void print_help() {
         "130 interrupted.\n");
 }
 
+// For the build, which installs what these print.
+void print_man_page() {
+    scree::ProgramPage page{"scree", "terrain pyramids for scree-view", {}};
+    for (const Command& c : kCommands) page.commands.emplace_back(c.name, c.summary);
+    fmt::print("{}", scree::man_page(page));
+}
+
+void print_completion() {
+    std::vector<std::string> words;
+    for (const Command& c : kCommands) words.emplace_back(c.name);
+    words.insert(words.end(), {"--help", "--version"});
+    fmt::print("{}", scree::completion_head("scree", words, false));
+    for (const Command& c : kCommands) {
+        std::string title = fmt::format("scree {}", c.name), flag = "--completion-case";
+        std::array<char*, 3> arguments{title.data(), flag.data(), nullptr};
+        c.run(2, arguments.data());
+    }
+    fmt::print("{}", scree::completion_tail("scree"));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -50,6 +73,8 @@ int main(int argc, char** argv) {
     const std::string_view name = argc > 1 ? argv[1] : "";
     if (name == "--help" || name == "-h") return print_help(), 0;
     if (name == "--version") return fmt::print("scree {}\n", SCREE_VERSION), 0;
+    if (name == "--man-page") return print_man_page(), 0;
+    if (name == "--completion") return print_completion(), 0;
     for (const Command& c : kCommands) {
         if (c.name != name) continue;
         std::string title = "scree " + std::string(name);

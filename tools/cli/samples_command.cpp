@@ -18,6 +18,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "common/cli/arguments.h"
 #include "common/process_usage.h"
 #include "common/progress.h"
 #include "common/report.h"
@@ -330,7 +331,7 @@ int run_samples(int argc, char** argv) {
                    "Heights: files and folders; where several have a value the later one lies on top")
         ->required()
         ->expected(1, -1);
-    auto* out = app.add_option("-o,--output", o.out, "The file to write");
+    auto* out = app.add_option("-o,--output", o.out, "The file to write")->type_name("FILE");
     app.add_option("--fd", o.descriptor, "Instead of -o: number of a file that is already open for writing")
         ->excludes(out)
         ->check(CLI::Range(3, 1 << 20));
@@ -341,12 +342,8 @@ int run_samples(int argc, char** argv) {
     app.add_option("--memory", memory, "Ceiling of resident memory, at least 192M")->capture_default_str();
     app.add_flag("--force", o.force, "Replace an existing OUT");
     app.add_flag("--quiet", o.quiet, "No progress");
-    app.add_option("--json", json, "Write the report as JSON to a file, or - for standard output");
-    try {
-        app.parse(argc, argv);
-    } catch (const CLI::ParseError& error) {
-        return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorCode::usage);
-    }
+    add_json_option(app, json);
+    if (const int code = parse_arguments(app, argc, argv); code >= 0) return code;
     const auto failed = [](const Error& error) { return report_error("scree samples", error); };
     if (o.out.empty() && o.descriptor < 0) return failed({ErrorCode::usage, "-o FILE or --fd N is required"});
     o.memory_bytes = parse_bytes(memory).value_or(0);

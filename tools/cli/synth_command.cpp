@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "common/cli/arguments.h"
 #include "common/progress.h"
 #include "common/report.h"
 #include "tools/source/synth.h"
@@ -47,12 +48,8 @@ int run_synth(int argc, char** argv) {
         ->capture_default_str();
     app.add_flag("--force", options.force, "Replace dem.tif and ortho.tif when they exist");
     app.add_flag("--quiet", quiet, "No progress on standard error");
-    app.add_option("--json", json_target, "Write a report there; - is standard output")->type_name("FILE|-");
-    try {
-        app.parse(argc, argv);
-    } catch (const CLI::ParseError& problem) {
-        return app.exit(problem) == 0 ? 0 : static_cast<int>(ErrorCode::usage);
-    }
+    add_json_option(app, json_target);
+    if (const int code = parse_arguments(app, argc, argv); code >= 0) return code;
 
     install_interrupt_handler();
     options.stop = &interrupt_flag();

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "common/cli/arguments.h"
 #include "common/report.h"
 #include "tools/pyramid/updater.h"
 
@@ -20,22 +21,19 @@ int run_update(int argc, char** argv) {
     app.add_option("STORE", options.store, "A .scree file that scree build wrote")->required();
     app.add_option("DEM", options.dems, "Heights: files and folders that lie on top; one of an old name replaces it")
         ->expected(0, -1);
-    app.add_option("--imagery", options.images, "Colour images: the same")->expected(1, -1);
+    app.add_option("--imagery", options.images, "Colour images: the same")->expected(1, -1)->type_name("PATH");
     app.add_option("--remove", options.remove, "Names of sources to take out, as scree info lists them")
         ->expected(1, -1);
     app.add_option("--sources", options.sources,
                    "Folders with the store's own sources, besides those of the store and of the new files")
-        ->expected(1, -1);
+        ->expected(1, -1)
+        ->type_name("DIR");
     app.add_option("--attribution", options.attribution, "Text shown with the terrain, instead of the store's");
     app.add_option("--threads", options.threads, "0: one a core")->capture_default_str()->check(CLI::Range(0, 1024));
     app.add_option("--memory", memory, "Ceiling of resident memory, at least 192M")->capture_default_str();
     app.add_flag("--quiet", options.quiet, "No progress");
-    app.add_option("--json", json, "Write the report as JSON to a file, or - for standard output");
-    try {
-        app.parse(argc, argv);
-    } catch (const CLI::ParseError& error) {
-        return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorCode::usage);
-    }
+    add_json_option(app, json);
+    if (const int code = parse_arguments(app, argc, argv); code >= 0) return code;
     const auto bytes = parse_bytes(memory);
     if (!bytes)
         return report_error("scree update",

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "common/cli/arguments.h"
 #include "common/report.h"
 #include "tools/verify/verify.h"
 
@@ -61,14 +62,9 @@ int run_verify(int argc, char** argv) {
         "Checks everything that a store promises: pages, rows, shared samples, certified errors, transparency.",
         "scree verify");
     app.add_option("STORE", path, "the .scree file")->required();
-    app.add_option("--json", json_path, "write the report as JSON to FILE, or to standard output for -")
-        ->type_name("FILE|-");
+    add_json_option(app, json_path);
     app.add_flag("--quiet", quiet, "no progress on standard error");
-    try {
-        app.parse(argc, argv);
-    } catch (const CLI::ParseError& error) {
-        return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorCode::usage);
-    }
+    if (const int code = parse_arguments(app, argc, argv); code >= 0) return code;
 
     install_interrupt_handler();
     ProgressLine line;

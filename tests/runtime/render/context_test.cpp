@@ -6,6 +6,7 @@
 #include <cstdlib>
 
 #include "runtime/render/render_target.h"
+#include "runtime/render/window_context.h"
 #include "tests/runtime/render/gl_test.h"
 
 namespace scree {
@@ -18,6 +19,18 @@ TEST_F(ContextTest, HeadlessSaysWhatDraws) {
     EXPECT_NE(context()->version().find("4."), std::string::npos);
     EXPECT_EQ(context()->is_software(), context()->renderer().find("llvmpipe") != std::string::npos);
     EXPECT_EQ(context()->window(), nullptr);
+}
+
+TEST_F(ContextTest, OneThatIsBorrowedIsTheOneThatIsCurrentAndStaysSo) {
+    {
+        auto borrowed = borrow_current_context();
+        ASSERT_TRUE(borrowed.ok()) << borrowed.error().message;
+        EXPECT_EQ((*borrowed)->renderer(), context()->renderer());
+        EXPECT_EQ((*borrowed)->version(), context()->version());
+        EXPECT_EQ((*borrowed)->window(), nullptr);
+        (*borrowed)->swap_buffers();
+    }
+    EXPECT_TRUE(RenderTarget::create({16, 16, 0}).ok());
 }
 
 TEST(WindowTest, ShowsWhatWasBlittedOrSaysThereIsNoDisplay) {

@@ -1,5 +1,6 @@
 #include "runtime/render/renderer.h"
 
+#include <epoxy/gl.h>
 #include <gtest/gtest.h>
 
 #include <array>
@@ -156,6 +157,37 @@ TEST_F(RendererTest, ColoursComeOutAsTheyWentIn) {
         EXPECT_NEAR(middle[1], 130, 1);
         EXPECT_NEAR(middle[2], 132, 1);
     }
+}
+
+TEST_F(RendererTest, ResettingPutsBackWhatDrawingChanged) {
+    constexpr std::array<std::pair<GLenum, GLint>, 11> kInitial{{{GL_DRAW_FRAMEBUFFER_BINDING, 0},
+                                                                 {GL_CURRENT_PROGRAM, 0},
+                                                                 {GL_VERTEX_ARRAY_BINDING, 0},
+                                                                 {GL_DRAW_INDIRECT_BUFFER_BINDING, 0},
+                                                                 {GL_PACK_ALIGNMENT, 4},
+                                                                 {GL_CLIP_ORIGIN, GL_LOWER_LEFT},
+                                                                 {GL_CLIP_DEPTH_MODE, GL_NEGATIVE_ONE_TO_ONE},
+                                                                 {GL_DEPTH_FUNC, GL_LESS},
+                                                                 {GL_DEPTH_TEST, 0},
+                                                                 {GL_CULL_FACE, 0},
+                                                                 {GL_FRAMEBUFFER_SRGB, 0}}};
+    const auto changed = [&] {
+        std::vector<GLenum> names;
+        for (const auto& [name, initial] : kInitial) {
+            GLint now = -1;
+            glGetIntegerv(name, &now);
+            if (now != initial) names.push_back(name);
+        }
+        return names;
+    };
+    make_small();
+    auto target = RenderTarget::create({kSize_px, kSize_px, 0});
+    ASSERT_TRUE(target.ok());
+    renderer_->draw(from_above(386), std::vector<DrawItem>(1), {}, *target);
+    EXPECT_GE(changed().size(), 8u);
+    target->read_pixels();
+    Renderer::reset_state();
+    EXPECT_EQ(changed(), std::vector<GLenum>{});
 }
 
 TEST_F(RendererTest, EachDrawTakesItsOwnSlotsAndPlace) {

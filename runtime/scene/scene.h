@@ -11,11 +11,11 @@
 #include <string>
 
 #include "common/store/sqlite_store.h"
-#include "runtime/app/store_watch.h"
 #include "runtime/lod/lod_method.h"
 #include "runtime/lod/page_mesher.h"
 #include "runtime/lod/selection.h"
 #include "runtime/paging/pager.h"
+#include "runtime/scene/store_watch.h"
 #include "runtime/view/curvature.h"
 #include "runtime/view/foresight.h"
 
@@ -35,6 +35,8 @@ struct SceneOptions {
     bool textures = true;
     bool follow = false;  ///< take up what updates make of the store; else a changed store is an error of complete()
     std::int64_t upload_bytes_per_frame = 4 << 20;  ///< about 90 textures; larger arrives sooner and may hitch
+    /// Told what is wrong and is borne: a damaged tile, an update that cannot be opened. Empty: to standard error.
+    std::function<void(const std::string& message)> on_trouble{};
 };
 
 /// Times and counts of one frame's thinking, before anything is drawn.
@@ -105,6 +107,7 @@ private:
     void mesh(std::span<const Camera> views, double half_curvature, const Residency& residency, Selection& selection);
     static Result<MemoryPlan> plan_of(const Dataset& dataset, const SceneOptions& options);
     void forget_selections();
+    void tell(const std::string& message) const;
     Result<void> make_pager();
     Result<void> use_store(std::shared_ptr<const SqliteStore> store);
     Result<void> expect_same_place(const SqliteStore& next) const;

@@ -1,4 +1,4 @@
-#include "runtime/app/store_watch.h"
+#include "runtime/scene/store_watch.h"
 
 #include <chrono>
 #include <utility>

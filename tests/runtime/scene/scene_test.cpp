@@ -1,4 +1,4 @@
-#include "runtime/app/scene.h"
+#include "runtime/scene/scene.h"
 
 #include <gtest/gtest.h>
 

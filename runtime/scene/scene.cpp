@@ -1,4 +1,4 @@
-#include "runtime/app/scene.h"
+#include "runtime/scene/scene.h"
 
 #include <fmt/format.h>
 
@@ -130,6 +130,13 @@ Result<void> Scene::start(TileSink& sink) {
     return {};
 }
 
+void Scene::tell(const std::string& message) const {
+    if (options_.on_trouble)
+        options_.on_trouble(message);
+    else
+        note("{}\n", message);
+}
+
 // A store is drawn as it was at one moment: where an update comes in between, it is opened once more.
 Result<void> Scene::make_pager() {
     for (int tries = 1;; ++tries) {
@@ -141,7 +148,9 @@ Result<void> Scene::make_pager() {
         auto pager = Pager::create(store_, pager_options, *sink_);
         if (pager) {
             pager_ = std::move(*pager);
-            pager_->on_damage = [path = store_->path()](const std::string& what) { note("{}: {}\n", path, what); };
+            pager_->on_damage = [this, path = store_->path()](const std::string& what) {
+                tell(fmt::format("{}: {}", path, what));
+            };
             return {};
         }
         if (!options_.follow || tries == kOpenings || !store_->has_changed()) return pager.error();
@@ -193,7 +202,7 @@ Result<void> Scene::follow() {
     if (!watch_) return {};
     if (auto trouble = watch_->take_trouble()) {
         trouble_ = std::move(*trouble);
-        note("{}; drawing what was there before\n", trouble_);
+        tell(fmt::format("{}; drawing what was there before", trouble_));
     }
     auto opened = watch_->take();
     if (!opened) return {};

@@ -1,4 +1,4 @@
-#include "runtime/app/frame_governor.h"
+#include "runtime/scene/frame_governor.h"
 
 #include <gtest/gtest.h>
 
