@@ -174,6 +174,27 @@ TEST_P(PageExtremes, ASmallPlanet) {
     EXPECT_GT(world.places_off(), 1000);
 }
 
+// Bumps that no tile but the finest has a sample of: coarser ones are flat, have no vertex that costs anything, and are
+// off all the same; on a small planet flat triangles are off by more.
+TEST_P(PageExtremes, ASmallPlanetOfBumpsThatOnlyTheFinestTilesHave) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    MeshedWorld world(
+        {}, [](std::int64_t i, std::int64_t j) { return i % 2 != 0 && j % 2 != 0 ? 40 : 0; }, lod());
+    double worst = 0;
+    for (int k = 0; k < 400; ++k) {
+        const double turn = test::uniform_real(random, 0, 6.28), far = test::uniform_real(random, 250, 400);
+        const Camera view = camera(world.at(32 + far * std::cos(turn), 32 + far * std::sin(turn), -300),
+                                   world.at(32, 32, -600), 20);
+        const double allowed_m = test::uniform_real(random, 21, 26);
+        const double half_curvature = test::uniform_real(random, 0.7, 1) * allowed_m / (32 * 80.0 * 80.0);
+        const double tau = allowed_m * view.focal_px() * view.off_axis_factor() / (10 * far - 320);
+        world.draw(view, tau, half_curvature);
+        worst = std::max(worst, world.greatest_error_px(view, world.mesh(), half_curvature) / tau);
+    }
+    std::printf("WORST %g\n", worst);
+}
+
 TEST_P(PageExtremes, AnyWorldFromAnyEye) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());
