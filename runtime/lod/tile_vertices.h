@@ -27,6 +27,7 @@ struct TileShape {
     TileId tile;
     int geomip = 0;
     unsigned edge_mask = 0;
+    float base_m = 0;  ///< greatest error of its own vertices: counts where curvature alone is missed. Flat: unused
 };
 
 /// An eye that sees a tile: f K of its camera, f where the metric is the paper's.
@@ -65,6 +66,8 @@ private:
     const std::vector<std::uint8_t>& allowed(const TileShape& shape);
     const std::vector<float>& places(int level);
     void finish(const TileShape& shape, std::uint8_t* active);
+    /// Errors with what flat triangles miss of the earth's curvature, in errors_.
+    const float* curved_errors(const TileShape& shape, double half_curvature);
     std::size_t at(std::int32_t slot) const { return static_cast<std::size_t>(slot) * vertices_; }
     double spacing_m(TileId tile) const;
 
