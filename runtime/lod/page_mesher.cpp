@@ -7,9 +7,11 @@
 #include <limits>
 #include <vector>
 
+#include "common/mesh/geometric_error.h"
 #include "runtime/lod/block_selection.h"
 #include "runtime/lod/cut.h"
 #include "runtime/lod/edge_agreement.h"
+#include "runtime/lod/page_measure.h"
 #include "runtime/lod/reuse.h"
 #include "runtime/lod/tile_vertices.h"
 
@@ -118,7 +120,8 @@ struct PageMesher::Impl {
                 if (tile < 0) {
                     tile = static_cast<std::int32_t>(tiles.size());
                     const auto& header = residency.heights.headers[static_cast<std::size_t>(item.height_slot)];
-                    tiles.push_back({{item.height_slot, item.tile, item.geomip, item.edge_mask},
+                    tiles.push_back({{item.height_slot, item.tile, item.geomip, item.edge_mask,
+                                      half_curvature > 0 ? base_error_m(header) : 0},
                                      0,
                                      0,
                                      box_of(item.tile, header.own, views, half_curvature),
@@ -133,6 +136,11 @@ struct PageMesher::Impl {
                 Drawn& tile = tiles[static_cast<std::size_t>(tile_of_slot[static_cast<std::size_t>(item.height_slot)])];
                 tile.part_level = std::max(tile.part_level, item.part.level);
             }
+    }
+
+    float base_error_m(const HeightTileHeader& header) const {
+        const std::array<double, 4> base_m = base_errors_m(dataset, header);
+        return round_up_to_float(*std::max_element(base_m.begin(), base_m.end()));
     }
 
     // With all that the curvature lowers it by, for any of the views.

@@ -111,6 +111,16 @@ void TileVertices::add_parents(const TileShape& shape, std::uint8_t* active) con
     }
 }
 
+// At the middle of a hypotenuse 2 l long l^2 / 2R are missed. A vertex that costs nothing leaves the surface as the
+// tile's own vertices have it: off by as much as they are.
+const float* TileVertices::curved_errors(const TileShape& shape, double half_curvature) {
+    const float* error = error_.data() + at(shape.slot);
+    const auto factor = static_cast<float>(spacing_m(shape.tile) * spacing_m(shape.tile) * half_curvature);
+    for (std::size_t v = 0; v < vertices_; ++v)
+        errors_[v] = (error[v] > 0 ? error[v] : shape.base_m) + factor * bulge_[v];
+    return errors_.data();
+}
+
 void TileVertices::choose(const TileShape& shape, std::span<const VertexEye> eyes, double tau_px, double half_curvature,
                           bool paper, std::uint8_t* active) {
     const std::vector<float>& place = places(shape.tile.level);
@@ -123,12 +133,7 @@ void TileVertices::choose(const TileShape& shape, std::span<const VertexEye> eye
                             middle_m_[static_cast<std::size_t>(shape.slot)]};
     std::memset(active, 0, vertices_);
     const float* error = error_.data() + first;
-    // What flat triangles miss of the earth's curvature: at the middle of a hypotenuse 2 l long l^2 / 2R.
-    if (half_curvature > 0 && !paper) {
-        const auto factor = static_cast<float>(spacing_m(shape.tile) * spacing_m(shape.tile) * half_curvature);
-        for (std::size_t v = 0; v < vertices_; ++v) errors_[v] = error[v] + factor * bulge_[v];
-        error = errors_.data();
-    }
+    if (half_curvature > 0 && !paper) error = curved_errors(shape, half_curvature);
     for (const VertexEye& eye : eyes) {
         const LocalEye local{static_cast<float>(eye.eye.x - middle.x), static_cast<float>(eye.eye.y - middle.y),
                              static_cast<float>(eye.eye.z - middle.z)};
@@ -150,11 +155,7 @@ void TileVertices::choose(const TileShape& shape, std::span<const VertexEye> eye
 
 void TileVertices::choose(const TileShape& shape, double threshold_m, double half_curvature, std::uint8_t* active) {
     const float* error = error_.data() + at(shape.slot);
-    if (half_curvature > 0) {
-        const auto factor = static_cast<float>(spacing_m(shape.tile) * spacing_m(shape.tile) * half_curvature);
-        for (std::size_t v = 0; v < vertices_; ++v) errors_[v] = error[v] + factor * bulge_[v];
-        error = errors_.data();
-    }
+    if (half_curvature > 0) error = curved_errors(shape, half_curvature);
     const auto threshold = static_cast<float>(threshold_m * (1 - 1e-6));
     // Saturated errors are monotone, and so are their sums, rounded.
     fails_threshold(error, vertices_, threshold, active);

@@ -27,6 +27,7 @@ struct TileShape {
     TileId tile;
     int geomip = 0;
     unsigned edge_mask = 0;
+    float base_m = 0;  ///< greatest error of its own vertices: counts where curvature alone is missed. Flat: unused
 };
 
 /// An eye that sees a tile: f K of its camera, f where the metric is the paper's.
@@ -66,6 +67,8 @@ private:
     const std::vector<float>& places(int level);
     void restrict_to(const TileShape& shape, std::uint8_t* active);
     void add_parents(const TileShape& shape, std::uint8_t* active) const;
+    /// Errors with what flat triangles miss of the earth's curvature, in errors_.
+    const float* curved_errors(const TileShape& shape, double half_curvature);
     std::size_t at(std::int32_t slot) const { return static_cast<std::size_t>(slot) * vertices_; }
     double spacing_m(TileId tile) const;
 
