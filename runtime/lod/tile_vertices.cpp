@@ -157,9 +157,10 @@ void TileVertices::choose(const TileShape& shape, double threshold_m, double hal
     const float* error = error_.data() + at(shape.slot);
     if (half_curvature > 0) error = curved_errors(shape, half_curvature);
     const auto threshold = static_cast<float>(threshold_m * (1 - 1e-6));
-    // Saturated errors are monotone, and so are their sums, rounded.
     fails_threshold(error, vertices_, threshold, active);
     restrict_to(shape, active);
+    // Saturated errors are monotone; with what stands in for errors of 0 over a curved earth they need not be.
+    if (half_curvature > 0) add_parents(shape, active);
 }
 
 bool TileVertices::complete_if_dense(const TileShape& shape, std::uint8_t* active) {
