@@ -5,6 +5,7 @@
 #include "common/cli/arguments.h"
 #include "common/report.h"
 #include "runtime/app/audit.h"
+#include "runtime/app/block_commands.h"
 #include "runtime/app/commands.h"
 #include "runtime/app/coverage.h"
 #include "runtime/app/source_samples.h"
@@ -182,6 +183,25 @@ void print(const AuditResult& r, const ViewOptions& o, const AuditOptions& a) {
                                        : "no error is promised");
 }
 
+Result<bool> run_blocks(const ViewOptions& o, const AuditOptions& a) {
+    for (const auto& [given, option] : {std::pair(a.moving, "--moving"), std::pair(!a.against.empty(), "--against")})
+        if (auto ok = refuse_with_blocks(given, option); !ok) return ok.error();
+    auto store = SqliteStore::open(o.store);
+    if (!store) return store.error();
+    auto path = flight_of(**store, o, a.frames);
+    if (!path) return path.error();
+    return audit_blocks(o, **store, *path);
+}
+
+Result<bool> run_tiles(const ViewOptions& o, const AuditOptions& a) {
+    auto result = audit(o, a);
+    if (!result) return result.error();
+    if (o.json != "-") print(*result, o, a);
+    if (!o.json.empty())
+        if (auto ok = write_text(o.json, report_of(*result, o, a).dump(2) + "\n"); !ok) return ok.error();
+    return result->kept;
+}
+
 }  // namespace
 
 int run_audit(int argc, char** argv) {
@@ -212,13 +232,9 @@ int run_audit(int argc, char** argv) {
     if (auto ok = check_view_options(o); !ok) return report_error("scree-view audit", ok.error());
     install_interrupt_handler();
     a.sampling.stop = &interrupt_flag();
-    auto result = audit(o, a);
-    if (!result) return report_error("scree-view audit", result.error());
-    if (o.json != "-") print(*result, o, a);
-    if (!o.json.empty())
-        if (auto ok = write_text(o.json, report_of(*result, o, a).dump(2) + "\n"); !ok)
-            return report_error("scree-view audit", ok.error());
-    return result->kept ? 0 : static_cast<int>(ErrorCode::check_failed);
+    const auto kept = wants_blocks(o) ? run_blocks(o, a) : run_tiles(o, a);
+    if (!kept) return report_error("scree-view audit", kept.error());
+    return *kept ? 0 : static_cast<int>(ErrorCode::check_failed);
 }
 
 }  // namespace scree

@@ -87,6 +87,11 @@ DrawnMesh drawn_mesh(const Dataset& d, const TilePatterns& patterns, const DrawL
 }
 
 CrackReport count_cracks(const Dataset& d, const DrawList& draws, const DrawnMesh& mesh) {
+    const Coverage covered(d, draws);
+    return count_cracks(mesh, [&](double i, double j) { return covered.at(i, j); });
+}
+
+CrackReport count_cracks(const DrawnMesh& mesh, const CoveredAt& covered) {
     CrackReport report;
     std::vector<Edge> edges;
     edges.reserve(mesh.corners.size());
@@ -100,7 +105,6 @@ CrackReport count_cracks(const Dataset& d, const DrawList& draws, const DrawnMes
         if (a.low != b.low) return a.low < b.low;
         return a.high < b.high;
     });
-    const Coverage covered(d, draws);
     std::vector<Edge> open;
     for (std::size_t first = 0, last = 0; first < edges.size(); first = last) {
         while (last < edges.size() && edges[last].low == edges[first].low && edges[last].high == edges[first].high)
@@ -114,7 +118,7 @@ CrackReport count_cracks(const Dataset& d, const DrawList& draws, const DrawnMes
             const double length = std::hypot(dx, dy);
             const double i = 0.5 * (double{1} * e.low.i + e.high.i) - 0.25 * dy / length;
             const double j = 0.5 * (double{1} * e.low.j + e.high.j) + 0.25 * dx / length;
-            if (last - first == 1 && !covered.at(i, j)) continue;
+            if (last - first == 1 && !covered(i, j)) continue;
             open.push_back(e);
         }
     }

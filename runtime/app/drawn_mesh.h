@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -36,7 +37,11 @@ struct CrackReport {
     std::int64_t t_junctions = 0;  ///< open edges with a vertex of another triangle inside them
 };
 
+/// Is terrain drawn at the lattice point (i, j), which lies in a cell and not on its border?
+using CoveredAt = std::function<bool(double i, double j)>;
+
 /// Counts cracks. Edges on the border of what is drawn (culled, absent, end of the data) are no cracks.
+CrackReport count_cracks(const DrawnMesh& mesh, const CoveredAt& covered);
 CrackReport count_cracks(const Dataset& dataset, const DrawList& draws, const DrawnMesh& mesh);
 
 /// Binary PLY, vertices as doubles in the dataset's coordinates, shared between triangles; z is lowered by curvature as

@@ -8,6 +8,7 @@
 #include "common/process_usage.h"
 #include "common/query/ground.h"
 #include "common/report.h"
+#include "runtime/app/block_commands.h"
 #include "runtime/app/commands.h"
 #include "runtime/app/coverage.h"
 #include "runtime/app/display.h"
@@ -308,9 +309,19 @@ Result<FlightPath> path_of(const TileStore& store, const ViewOptions& o, const F
     return paced(*path, f.step_m, f.frames);
 }
 
+Result<void> run_blocks(const ViewOptions& o, const FlyOptions& f, const TileStore& store) {
+    for (const auto& [given, option] : {std::pair(f.settled, "--settled"), std::pair(f.see_through, "--see-through"),
+                                        std::pair(f.latency_ms > 0, "--latency")})
+        if (auto ok = refuse_with_blocks(given, option); !ok) return ok;
+    auto path = path_of(store, o, f);
+    if (!path) return path.error();
+    return fly_blocks(o, store, *path, {f.headless, f.fps, f.tau_most_px, f.csv, f.last_frame});
+}
+
 Result<void> run(const ViewOptions& o, const FlyOptions& f) {
     auto store = SqliteStore::open(o.store);
     if (!store) return store.error();
+    if (wants_blocks(o)) return run_blocks(o, f, **store);
     SceneOptions options = scene_options(o);
     options.latency_ms = f.latency_ms;
     options.follow = true;

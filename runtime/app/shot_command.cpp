@@ -5,6 +5,7 @@
 
 #include "common/cli/arguments.h"
 #include "common/report.h"
+#include "runtime/app/block_commands.h"
 #include "runtime/app/commands.h"
 #include "runtime/app/display.h"
 #include "runtime/app/drawn_mesh.h"
@@ -29,6 +30,10 @@ Result<void> shoot(const ViewOptions& o, const std::optional<FlightPose>& asked,
                    const std::string& mesh_file, const FrameSettings& debug) {
     auto store = SqliteStore::open(o.store);
     if (!store) return store.error();
+    if (wants_blocks(o)) {
+        if (auto ok = refuse_with_blocks(debug.colour_by_level, "--colour-by-level"); !ok) return ok;
+        return shoot_blocks(o, **store, {asked, out, mesh_file, debug});
+    }
     SceneOptions options = scene_options(o);
     options.follow = true;  // a picture of one state, whatever happens meanwhile
     auto scene = Scene::open(std::move(*store), options);

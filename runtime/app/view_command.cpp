@@ -7,6 +7,7 @@
 
 #include "common/cli/arguments.h"
 #include "common/report.h"
+#include "runtime/app/block_commands.h"
 #include "runtime/app/commands.h"
 #include "runtime/app/display.h"
 #include "runtime/app/fly_controls.h"
@@ -74,6 +75,7 @@ struct WindowSettings {
 Result<void> view(ViewOptions o, const WindowSettings& w) {
     auto store = SqliteStore::open(o.store);
     if (!store) return store.error();
+    if (wants_blocks(o)) return view_blocks(o, std::move(*store), {w.seconds, w.fps, w.tau_most_px});
     SceneOptions options = scene_options(o);
     options.follow = true;
     auto scene = Scene::open(std::move(*store), options);

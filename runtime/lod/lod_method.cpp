@@ -107,7 +107,6 @@ std::string command_line_of(const LodSettings& s) {
 
 // A method that can be drawn has its line here.
 bool is_built_in(const LodSettings& s) {
-    if (s.cracks != CrackFix::stitch) return false;
     return s.method != LodMethod::geomip || s.metric != ErrorMetric::uc;
 }
 

@@ -96,6 +96,16 @@ Result<ProgramHandle> build_terrain_program(const TerrainVariant& variant) {
                           {}});
 }
 
+Result<ProgramHandle> build_surface_program(bool with_haze) {
+    using namespace shader_source;
+    return build_program({"surface",
+                          {std::string(shared_constants), std::string(terrain_position), std::string(atmosphere),
+                           std::string(surface_vert)},
+                          {std::string(shared_constants), with_bool("kWithHaze", with_haze), std::string(atmosphere),
+                           std::string(surface_frag)},
+                          {}});
+}
+
 Result<ProgramHandle> build_sky_program() {
     using namespace shader_source;
     return build_program({"sky",

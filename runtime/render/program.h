@@ -23,6 +23,8 @@ struct TerrainVariant {
 };
 
 Result<ProgramHandle> build_terrain_program(const TerrainVariant& variant);
+/// Of SurfaceRenderer.
+Result<ProgramHandle> build_surface_program(bool with_haze);
 Result<ProgramHandle> build_sky_program();
 
 /// The strings that make the terrain's vertex shader, in order.

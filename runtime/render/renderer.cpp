@@ -14,6 +14,7 @@
 
 #include "runtime/render/draw_batches.h"
 #include "runtime/render/draw_stream.h"
+#include "runtime/render/frame_passes.h"
 #include "runtime/render/index_arena.h"
 #include "runtime/render/program.h"
 #include "runtime/render/shader_constants.h"
@@ -27,9 +28,6 @@ namespace {
 constexpr GLuint kVertexBinding = 0;
 constexpr GLuint kDrawBinding = 1;
 constexpr GLuint kBlendBinding = 2;
-
-/// Haze of the sky below the horizon where the scene asks for none.
-constexpr double kBackdropHaze_m = 20'000;
 
 using Clock = std::chrono::steady_clock;
 
@@ -86,32 +84,6 @@ std::size_t look_of(const FrameSettings& settings) {
     return (settings.haze_distance_m > 0 ? 1u : 0u) + (settings.colour_by_level ? 2u : 0u);
 }
 
-/// Columns that take {x, y, 1} on the screen to a view ray.
-glm::mat3 ray_from_screen(const Camera& camera) {
-    return {glm::vec3(camera.right() * camera.tan_half_x()), glm::vec3(camera.up * camera.tan_half_y()),
-            glm::vec3(camera.forward)};
-}
-
-void set_atmosphere(GLuint program, const Camera& camera, const FrameSettings& settings) {
-    const double distance_m = settings.haze_distance_m > 0 ? settings.haze_distance_m : kBackdropHaze_m;
-    const double scale_height_m = std::max(settings.haze_scale_height_m, 1.0);
-    const double altitude_m = std::max(camera.eye.z - settings.ground_height_m, 1.0);
-    glProgramUniform3fv(program, shader::kSunUniform, 1, &settings.sun_direction.x);
-    glProgramUniform4f(program, shader::kHazeUniform, static_cast<float>(1 / distance_m),
-                       static_cast<float>(1 / scale_height_m), static_cast<float>(altitude_m),
-                       static_cast<float>(std::exp(-altitude_m / scale_height_m)));
-}
-
-void set_position(GLuint program, const Camera& camera, const RelativeFrame& frame) {
-    const glm::mat4 clip = clip_from_relative(camera);
-    glProgramUniformMatrix4fv(program, shader::kClipFromRelativeUniform, 1, GL_FALSE, &clip[0].x);
-    glProgramUniform3i(program, shader::kAnchorUniform, frame.i0, frame.j0, frame.n0);
-    glProgramUniform1f(program, shader::kSpacingUniform, frame.spacing_m);
-    glProgramUniform1f(program, shader::kQuantumUniform, frame.quantum_m);
-    glProgramUniform3fv(program, shader::kFractionUniform, 1, &frame.fraction_m.x);
-    glProgramUniform1f(program, shader::kHalfCurvatureUniform, frame.half_curvature);
-}
-
 }  // namespace
 
 std::size_t renderer_bytes(const RendererOptions& options) {
@@ -128,8 +100,7 @@ struct Renderer::State {
     DrawBatches batches;
     DrawStream stream;
     VertexArrayHandle plain_array, blended_array;
-    VertexArrayHandle sky_array;  ///< no attributes
-    ProgramHandle sky;
+    SkyPass sky;
     std::array<std::array<ProgramHandle, 4>, kImageryKinds> terrain;  ///< [imagery][haze + 2 * colour by level]
 
     int bound_arrays = 1;  ///< by Imagery::blended_of_all
@@ -145,16 +116,12 @@ struct Renderer::State {
                       FrameTimes& times);
     void bind_textures(const DrawBatch& batch) const;
     void draw_batch(const DrawBatch& batch, const FrameSettings& settings, const DrawStream::Region& region) const;
-    void draw_sky(const Camera& camera, const FrameSettings& settings);
 };
 
 Result<void> Renderer::State::build_programs() {
-    auto built = build_sky_program();
-    if (!built) return built.error();
-    sky = std::move(*built);
     for (std::size_t imagery = 0; imagery < kImageryKinds; ++imagery) {
         for (std::size_t look = 0; look < terrain[imagery].size(); ++look) {
-            built =
+            auto built =
                 build_terrain_program({options.lattice.tile_cells_log2, options.texture_size_log2,
                                        static_cast<Imagery>(imagery), bound_arrays, (look & 1) != 0, (look & 2) != 0});
             if (!built) return built.error();
@@ -278,15 +245,6 @@ void Renderer::State::draw_terrain(const Camera& camera, const FrameSettings& se
     times.blended_draws = static_cast<std::uint32_t>(batches.blended_draws());
 }
 
-void Renderer::State::draw_sky(const Camera& camera, const FrameSettings& settings) {
-    const glm::mat3 rays = ray_from_screen(camera);
-    glProgramUniformMatrix3fv(sky.name(), shader::kRayFromScreenUniform, 1, GL_FALSE, &rays[0].x);
-    set_atmosphere(sky.name(), camera, settings);
-    glUseProgram(sky.name());
-    glBindVertexArray(sky_array.name());
-    glDrawArrays(GL_TRIANGLES, 0, 3);
-}
-
 Renderer::Renderer(std::unique_ptr<State> state) : state_(std::move(state)) {}
 Renderer::~Renderer() = default;
 
@@ -318,9 +276,9 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const RendererOptions& option
     state->indices = std::move(*indices);
     state->plain_array = make_vertex_array(state->vertices, state->indices, false);
     state->blended_array = make_vertex_array(state->vertices, state->indices, true);
-    GLuint empty = 0;
-    glCreateVertexArrays(1, &empty);
-    state->sky_array = VertexArrayHandle(empty);
+    auto sky = SkyPass::create();
+    if (!sky) return sky.error();
+    state->sky = std::move(*sky);
     if (glGetError() != GL_NO_ERROR) return Error{ErrorCode::display, "OpenGL has no memory for its vertex arrays"};
     return std::unique_ptr<Renderer>(new Renderer(std::move(state)));
 }
@@ -347,24 +305,10 @@ FrameTimes Renderer::draw(const Camera& camera, std::span<const DrawItem> items,
     times.triangles = state_->write_draws(items, region);
     times.draws = static_cast<std::uint32_t>(state_->batches.draws().size());
 
-    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, target.framebuffer());
-    glViewport(0, 0, target.width_px(), target.height_px());
-    glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
-    glEnable(GL_FRAMEBUFFER_SRGB);
-    glEnable(GL_DEPTH_TEST);
-    glDepthMask(GL_TRUE);
-    glDepthFunc(GL_GEQUAL);  // reversed: nearer is larger, and the sky at 0 passes where nothing was drawn
-    glEnable(GL_CULL_FACE);
-    glDisable(GL_BLEND);
-    glDisable(GL_SCISSOR_TEST);
-    constexpr std::array<float, 4> kMagenta{1, 0, 1, 1};
-    constexpr float kInfinitelyFar = 0;
-    glClearNamedFramebufferfv(target.framebuffer(), GL_COLOR, 0, kMagenta.data());
-    glClearNamedFramebufferfv(target.framebuffer(), GL_DEPTH, 0, &kInfinitelyFar);
-
+    begin_picture(target);
     state_->draw_terrain(camera, settings, region, times);
     state_->stream.end_frame();
-    if (!settings.magenta_background) state_->draw_sky(camera, settings);
+    if (!settings.magenta_background) state_->sky.draw(camera, settings);
 
     times.submitted_ms = ms_since(start);
     if (settings.wait_until_drawn) {

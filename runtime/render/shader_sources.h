@@ -15,6 +15,8 @@ extern const std::string_view imagery_blended;
 extern const std::string_view atmosphere;
 extern const std::string_view terrain_vert;
 extern const std::string_view terrain_frag;
+extern const std::string_view surface_vert;
+extern const std::string_view surface_frag;
 extern const std::string_view sky_vert;
 extern const std::string_view sky_frag;
 

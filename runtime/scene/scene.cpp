@@ -80,6 +80,9 @@ Scene::~Scene() = default;
 
 Result<std::unique_ptr<Scene>> Scene::open(std::shared_ptr<const SqliteStore> store, const SceneOptions& options) {
     if (auto ok = expect_built_in(options.lod); !ok) return ok.error();
+    if (options.lod.cracks == CrackFix::dike)
+        return Error{ErrorCode::usage, fmt::format("{} draws no tiles: shot, fly, audit and the window show it",
+                                                   command_line_of(options.lod))};
     auto memory = plan_of(store->dataset(), options);
     if (!memory) return memory.error();
     return std::unique_ptr<Scene>(new Scene(std::move(store), options, *memory));

@@ -52,7 +52,8 @@ struct SceneFrame {
 
 class Scene {
 public:
-    /// Errors: ErrorCode::usage where the budget is too small or `options.lod` is not built in.
+    /// Errors: ErrorCode::usage where the budget is too small or `options.lod` is not built in; for CrackFix::dike,
+    /// which is a BlockScene.
     static Result<std::unique_ptr<Scene>> open(std::shared_ptr<const SqliteStore> store, const SceneOptions& options);
     /// `store` outlives the scene.
     static Result<std::unique_ptr<Scene>> open(const SqliteStore& store, const SceneOptions& options) {

@@ -37,6 +37,13 @@ float mean_haze_density(float rise_m) {
 // Share of light lost over a ray (Beer-Lambert).
 float haze_share(float mean_density, float distance_m) { return 1.0 - exp(-mean_density * distance_m * haze.x); }
 
+// What is seen of a colour at the end of a ray.
+vec3 hazy(vec3 colour, vec3 ray_m, float mean_density) {
+    float distance_m = length(ray_m);
+    vec3 horizon = horizon_colour(towards_sun(ray_m / distance_m));
+    return mix(colour, horizon, haze_share(mean_density, distance_m));
+}
+
 vec3 sky_colour(vec3 direction) {
     float towards = towards_sun(direction);
     vec3 horizon = horizon_colour(towards);

@@ -11,6 +11,11 @@ const int kCoarseAttribute = 6;      // vec4: scale, offset u, offset v of the c
 const int kCodesAttribute = 7;       // uvec2: texture codes of the own and of the coarse texture
 const int kNeighboursAttribute = 8;  // uvec4: codes of the textures round the own one, two to a word, by TextureSide
 
+// Of an untextured surface (SurfaceVertex), all by vertex.
+const int kSurfaceLatticeAttribute = 0;  // ivec2: lattice i, j
+const int kSurfaceHeightAttribute = 1;   // float: quanta
+const int kSurfaceNormalAttribute = 2;   // vec2: east and north parts of the unit normal
+
 // How 16 bits name a texture of a blended draw: the unit that its array is bound to, then its layer there.
 const int kTextureLayerBits = 11;
 const int kTextureLayerMask = 0x7ff;
@@ -27,5 +32,6 @@ const int kSunUniform = 5;               // vec3: unit direction towards the sun
 const int kHazeUniform = 6;              // vec4: see atmosphere.glsl
 const int kRayFromScreenUniform = 7;     // mat3: {x, y, 1} on the screen, -1..1, to a view ray (not normalised)
 const int kHalfCurvatureUniform = 8;     // float: 1 / (2 R), 1/m; 0: flat
+const int kTintUniform = 9;              // vec2: share of a surface's range of heights, n * x + y
 
 const int kImageryTextureUnit = 0;  // and those after it, in blended draws

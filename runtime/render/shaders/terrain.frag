@@ -17,10 +17,6 @@ void main() {
     if (texel.a < 0.5) discard;
     vec3 colour = texel.rgb / texel.a;
     if (kColourByLevel) colour = mix(colour, level_colour(), 0.6);
-    if (kWithHaze) {
-        float distance_m = length(relative_m);
-        vec3 horizon = horizon_colour(towards_sun(relative_m / distance_m));
-        colour = mix(colour, horizon, haze_share(haze_density, distance_m));
-    }
+    if (kWithHaze) colour = hazy(colour, relative_m, haze_density);
     fragment_colour = vec4(colour, 1.0);
 }

@@ -1,0 +1,283 @@
+#include "runtime/app/block_commands.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <nlohmann/json.hpp>
+
+#include "common/process_usage.h"
+#include "common/report.h"
+#include "runtime/app/block_display.h"
+#include "runtime/app/block_scene.h"
+#include "runtime/app/statistics.h"
+#include "runtime/lod/block_truth.h"
+#include "runtime/render/png.h"
+#include "runtime/scene/frame_governor.h"
+
+namespace scree {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using Json = nlohmann::ordered_json;
+
+// Rounding of float positions and of their projections on screen (Scree lod, 5.2), at 800 px.
+constexpr double kRoundingPx = 1e-3;
+
+double share(std::int64_t part, std::int64_t whole) {
+    return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0;
+}
+
+// What is said of every picture and flight: whether anything is promised, and what of the store is not shown.
+void describe(Json& report, const BlockScene& scene) {
+    report["guaranteed"] = scene.promise_px().has_value();
+    report["complete_triangles"] = scene.world().complete_triangles();
+    report["dropped_columns"] = scene.world().dropped_columns();
+    report["dropped_rows"] = scene.world().dropped_rows();
+}
+
+std::string promise_text(const std::optional<double>& promise_px) {
+    return promise_px ? fmt::format("at most {:.3g} px from the finest surface", *promise_px)
+                      : "how far from the finest surface is not promised";
+}
+
+std::string dropped_text(const BlockWorld& world) {
+    if (world.dropped_columns() == 0 && world.dropped_rows() == 0) return {};
+    return fmt::format("\nnot shown, as no whole block: {} columns in the east, {} rows in the south",
+                       world.dropped_columns(), world.dropped_rows());
+}
+
+Json shot_report(const BlockScene& scene, const BlockFrame& frame, const FlightPose& pose) {
+    Json report = {{"triangles", frame.triangles()},
+                   {"blocks", frame.blocks.size()},
+                   {"strips", frame.strips.size()},
+                   {"block_triangles", frame.block_triangles},
+                   {"dike_triangles", frame.dike_triangles}};
+    if (const auto promise_px = scene.promise_px()) report["max_bound_px"] = *promise_px;
+    report["tau_effective_px"] = scene.tau_px();
+    report["curvature"] = false;
+    report["eye"] = {pose.eye.x, pose.eye.y, pose.eye.z};
+    report["look"] = {pose.look.x, pose.look.y, pose.look.z};
+    describe(report, scene);
+    return report;
+}
+
+struct FlightLog {
+    Series frame_ms, select_ms, triangles, blocks, strips, tau;
+    std::int64_t drawn = 0, reused = 0, meshes_made = 0, strips_made = 0, holes = 0;
+    double max_bound_px = 0;
+    std::string csv =
+        "frame,frame_ms,select_ms,triangles,blocks,strips,reused,meshes_made,tau_effective_px,rss_bytes\n";
+
+    void add(std::size_t k, double ms, const BlockFrame& frame, const BlockScene& scene) {
+        frame_ms.add(ms);
+        select_ms.add(frame.lod_ms);
+        triangles.add(static_cast<double>(frame.triangles()));
+        blocks.add(static_cast<double>(frame.blocks.size()));
+        strips.add(static_cast<double>(frame.strips.size()));
+        tau.add(scene.tau_px());
+        drawn += static_cast<std::int64_t>(frame.blocks.size());
+        reused += frame.reused;
+        meshes_made += frame.meshes_made;
+        strips_made += frame.strips_made;
+        max_bound_px = std::max(max_bound_px, scene.promise_px().value_or(0));
+        csv += fmt::format("{},{:.3f},{:.4f},{},{},{},{},{},{:.4f},{}\n", k, ms, frame.lod_ms, frame.triangles(),
+                           frame.blocks.size(), frame.strips.size(), frame.reused, frame.meshes_made, scene.tau_px(),
+                           resident_bytes());
+    }
+};
+
+Result<FlightLog> fly(const ViewOptions& o, const FlightPath& path, const BlockFlight& f, BlockScene& scene,
+                      BlockDisplay& display) {
+    FlightLog log;
+    FrameGovernor governor({f.fps > 0 ? 1000 / f.fps : 1e9, o.tau_px, f.tau_most_px});
+    for (std::size_t k = 0; k < path.size(); ++k) {
+        if (interrupt_flag()) return Error{ErrorCode::interrupted, "stopped"};
+        auto camera = camera_of(path[k], o);
+        if (!camera) return camera.error();
+        const auto start = Clock::now();
+        const BlockFrame& frame = scene.select(*camera);
+        if (auto times = display.draw(*camera); !times) return times.error();
+        display.show();
+        const double ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+        log.add(k, ms, frame, scene);
+        log.holes += scene.count_holes(*camera);
+        if (f.fps > 0) scene.set_tau_px(governor.next(ms));
+    }
+    return log;
+}
+
+Json flight_report(const FlightLog& log, const BlockScene& scene, const ViewOptions& o, const std::string& renderer) {
+    Json report = {{"frames", log.frame_ms.values.size()},
+                   {"frame_ms", log.frame_ms.spread()},
+                   {"select_ms", log.select_ms.spread()},
+                   {"triangles", log.triangles.mean_max()},
+                   {"blocks", log.blocks.mean_max()},
+                   {"strips", log.strips.mean_max()},
+                   {"reused_share", share(log.reused, log.drawn)},
+                   {"meshes_made", log.meshes_made},
+                   {"strips_made", log.strips_made},
+                   {"budget_bytes", o.budget_bytes},
+                   {"peak_resident_bytes", scene.resident_bytes()},
+                   {"peak_rss_bytes", process_usage().peak_rss_bytes},
+                   {"holes", log.holes}};
+    if (scene.promise_px()) report["max_bound_px"] = log.max_bound_px;
+    report["tau_effective_px"] = log.tau.mean_max();
+    report["tau_px"] = o.tau_px;
+    report["size_px"] = {o.width_px, o.height_px};
+    report["renderer"] = renderer;
+    describe(report, scene);
+    return report;
+}
+
+void print_flight(const FlightLog& log, const BlockScene& scene, const ViewOptions& o, const std::string& renderer) {
+    fmt::print(
+        "{} frames on {}: median {:.1f} ms, p99 {:.1f} ms; selection median {:.3f} ms; {:.0f} triangles in {:.0f} "
+        "blocks and {:.0f} strips (mean)\n"
+        "{}; {:.1f} % of the blocks reused, {} holes; {:.1f} of {:.1f} MB for heights and meshes{}\n",
+        log.frame_ms.values.size(), renderer, log.frame_ms.quantile(0.5), log.frame_ms.quantile(0.99),
+        log.select_ms.quantile(0.5), log.triangles.mean(), log.blocks.mean(), log.strips.mean(),
+        promise_text(scene.promise_px() ? std::optional(log.max_bound_px) : std::nullopt),
+        100 * share(log.reused, log.drawn), log.holes, static_cast<double>(scene.resident_bytes()) / 1e6,
+        static_cast<double>(o.budget_bytes) / 1e6, dropped_text(scene.world()));
+}
+
+struct BlockAudit {
+    BlockTruth truth;
+    CrackReport cracks;
+    std::int64_t holes = 0, blocks = 0, reused = 0;
+    int frames = 0;
+    double worst_share = 0;  ///< greatest error of a frame over what was promised
+
+    void look(BlockScene& scene, const Camera& camera) {
+        const BlockFrame& frame = scene.select(camera);
+        const double limit_px = scene.promise_px().value_or(scene.tau_px()) + kRoundingPx;
+        judge_frame(scene.world(), camera, frame, limit_px, truth);
+        const CrackReport found = scene.count_cracks();
+        cracks.edges += found.edges;
+        cracks.open_edges += found.open_edges;
+        cracks.t_junctions += found.t_junctions;
+        holes += scene.count_holes(camera);
+        blocks += static_cast<std::int64_t>(frame.blocks.size());
+        reused += frame.reused;
+        worst_share = max_px() / limit_px;  // one limit for all frames
+        ++frames;
+    }
+    double max_px() const { return std::max(truth.blocks.max_px(), truth.dikes.max_px()); }
+    bool kept() const { return worst_share <= 1 && cracks.open_edges == 0 && cracks.t_junctions == 0 && holes == 0; }
+};
+
+Json audit_report(const BlockAudit& a, const BlockScene& scene) {
+    Json report = {{"frames", a.frames},
+                   {"tau_px", scene.tau_px()},
+                   {"max_error_px", a.max_px()},
+                   {"p99_error_px", a.truth.blocks.quantile_px(0.99)},
+                   {"mean_error_px", a.truth.blocks.mean_px()}};
+    const auto promise_px = scene.promise_px();
+    if (promise_px) {
+        report["max_bound_px"] = *promise_px;
+        report["worst_share_of_promise"] = a.worst_share;
+    }
+    report["open_edges"] = a.cracks.open_edges;
+    report["t_junctions"] = a.cracks.t_junctions;
+    report["samples"] = a.truth.blocks.count();
+    report["holes"] = a.holes;
+    report["blocks"] = a.blocks;
+    report["strips"] = a.truth.strips;
+    report["reused_share"] = share(a.reused, a.blocks);
+    report["dikes"] = {{"max_error_px", a.truth.dikes.max_px()},
+                       {"p99_error_px", a.truth.dikes.quantile_px(0.99)},
+                       {"mean_error_px", a.truth.dikes.mean_px()},
+                       {"samples", a.truth.dikes.count()},
+                       {"strips_above", a.truth.strips_above}};
+    describe(report, scene);
+    if (promise_px) report["kept"] = a.kept();
+    return report;
+}
+
+void print_audit(const BlockAudit& a, const BlockScene& scene) {
+    const auto promise_px = scene.promise_px();
+    fmt::print(
+        "{} frames, {} samples: error max {:.4f} px, p99 {:.4f}, mean {:.5f}; {} at tau {}\n"
+        "of these {} strips, {} samples: error max {:.4f} px, {} strips above {}\n",
+        a.frames, a.truth.blocks.count() + a.truth.dikes.count(), a.max_px(), a.truth.blocks.quantile_px(0.99),
+        a.truth.blocks.mean_px(), promise_px ? fmt::format("promised {:.4f}", *promise_px) : "nothing promised",
+        scene.tau_px(), a.truth.strips, a.truth.dikes.count(), a.truth.dikes.max_px(), a.truth.strips_above,
+        promise_px ? "the promise" : "tau");
+    fmt::print("{} open edges, {} T-junctions, {} holes{}{}\n", a.cracks.open_edges, a.cracks.t_junctions, a.holes,
+               !promise_px ? ""
+               : a.kept()  ? ": the promise holds"
+                           : ": THE PROMISE IS BROKEN",
+               dropped_text(scene.world()));
+}
+
+}  // namespace
+
+Result<void> refuse_with_blocks(bool given, const std::string& option) {
+    if (!given) return {};
+    return Error{ErrorCode::usage,
+                 fmt::format("{} with --cracks dike: it goes with tiles that are paged only", option)};
+}
+
+Result<void> shoot_blocks(const ViewOptions& o, const TileStore& store, const BlockShot& shot) {
+    auto scene = BlockScene::open(store, scene_options(o));
+    if (!scene) return scene.error();
+    auto display = BlockDisplay::create(**scene, {o.width_px, o.height_px});
+    if (!display) return display.error();
+    (*display)->frame_settings().wireframe = shot.debug.wireframe;
+    (*display)->frame_settings().magenta_background = shot.debug.magenta_background;
+    const Dataset& d = (*scene)->dataset();
+    const FlightPose pose = shot.pose.value_or(overview(d, o.fov_deg, static_cast<double>(o.width_px) / o.height_px));
+    auto camera = camera_of(pose, o);
+    if (!camera) return camera.error();
+    const BlockFrame& frame = (*scene)->select(*camera);
+    if (auto times = (*display)->draw(*camera); !times) return times.error();
+    if (auto ok = write_png(shot.out, o.width_px, o.height_px, (*display)->target().read_pixels()); !ok) return ok;
+    if (!shot.mesh_file.empty())
+        if (auto ok = write_ply(shot.mesh_file, d, (*scene)->drawn_mesh(), camera->eye, 0); !ok) return ok;
+    if (o.json != "-")
+        fmt::print("{}: {} triangles in {} blocks and {} strips, {}{}\n", shot.out, frame.triangles(),
+                   frame.blocks.size(), frame.strips.size(), promise_text((*scene)->promise_px()),
+                   dropped_text((*scene)->world()));
+    if (o.json.empty()) return {};
+    return write_text(o.json, shot_report(**scene, frame, pose).dump(2) + "\n");
+}
+
+Result<void> fly_blocks(const ViewOptions& o, const TileStore& store, const FlightPath& path, const BlockFlight& f) {
+    auto scene = BlockScene::open(store, scene_options(o));
+    if (!scene) return scene.error();
+    DisplayOptions display_options{o.width_px, o.height_px};
+    display_options.window = !f.headless;
+    auto display = BlockDisplay::create(**scene, display_options);
+    if (!display) return display.error();
+    (*display)->frame_settings().wait_until_drawn = true;
+    auto log = fly(o, path, f, **scene, **display);
+    if (!log) return log.error();
+    if (!f.csv.empty())
+        if (auto ok = write_text(f.csv, log->csv); !ok) return ok;
+    if (!f.last_frame.empty())
+        if (auto ok = write_png(f.last_frame, o.width_px, o.height_px, (*display)->target().read_pixels()); !ok)
+            return ok;
+    const std::string renderer = (*display)->context().renderer();
+    if (o.json != "-") print_flight(*log, **scene, o, renderer);
+    return o.json.empty() ? Result<void>{}
+                          : write_text(o.json, flight_report(*log, **scene, o, renderer).dump(2) + "\n");
+}
+
+Result<bool> audit_blocks(const ViewOptions& o, const TileStore& store, const FlightPath& path) {
+    auto scene = BlockScene::open(store, scene_options(o));
+    if (!scene) return scene.error();
+    BlockAudit audit;
+    for (const FlightPose& pose : path) {
+        if (interrupt_flag()) return Error{ErrorCode::interrupted, "stopped"};
+        auto camera = camera_of(pose, o);
+        if (!camera) return camera.error();
+        audit.look(**scene, *camera);
+    }
+    if (o.json != "-") print_audit(audit, **scene);
+    if (!o.json.empty())
+        if (auto ok = write_text(o.json, audit_report(audit, **scene).dump(2) + "\n"); !ok) return ok.error();
+    return !(*scene)->promise_px() || audit.kept();
+}
+
+}  // namespace scree

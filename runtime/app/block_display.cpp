@@ -1,0 +1,115 @@
+#include "runtime/app/block_display.h"
+
+#include "runtime/render/window_context.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+namespace scree {
+namespace {
+
+/// Of the finest surface, by the samples on both sides.
+class Normals {
+public:
+    explicit Normals(const BlockScene& scene) : scene_(scene), row_(scene.world().bisection().row()) {}
+
+    glm::dvec3 at(LatticePoint p) const {
+        const BlockWorld& world = scene_.world();
+        const std::int64_t last_i = world.columns() * row_ - 1, last_j = world.rows() * row_ - 1;
+        const LatticePoint west{std::max<std::int64_t>(p.i - 1, 0), p.j}, east{std::min(p.i + 1, last_i), p.j},
+            north{p.i, std::max<std::int64_t>(p.j - 1, 0)}, south{p.i, std::min(p.j + 1, last_j)};
+        const double spacing_m = world.spacing_m();
+        return glm::normalize(glm::dvec3{(z(west) - z(east)) / (static_cast<double>(east.i - west.i) * spacing_m),
+                                         (z(south) - z(north)) / (static_cast<double>(south.j - north.j) * spacing_m),
+                                         1});
+    }
+
+private:
+    double z(LatticePoint p) const {
+        const std::int64_t block = p.j / row_ * scene_.world().columns() + p.i / row_;
+        return scene_.world().heights(
+            static_cast<int>(block))[static_cast<std::size_t>(p.j % row_ * row_ + p.i % row_)];
+    }
+
+    const BlockScene& scene_;
+    std::int64_t row_;
+};
+
+std::vector<SurfaceVertex> surface_vertices(const BlockScene& scene) {
+    const Normals normals(scene);
+    std::vector<SurfaceVertex> vertices(scene.world().vertex_count());
+    for (std::uint32_t v = 0; v < scene.world().vertex_count(); ++v) {
+        const LatticePoint p = scene.lattice_point(v);
+        const glm::dvec3 normal = 32767.0 * normals.at(p);
+        vertices[v] = {static_cast<std::int32_t>(p.i), static_cast<std::int32_t>(p.j), scene.height_n(v),
+                       static_cast<std::int16_t>(std::lround(normal.x)),
+                       static_cast<std::int16_t>(std::lround(normal.y))};
+    }
+    return vertices;
+}
+
+Result<std::unique_ptr<SurfaceRenderer>> make_renderer(const BlockScene& scene) {
+    static_assert(BlockScene::kBytesPerSample == BlockWorld::kBytesPerSample + sizeof(SurfaceVertex) + 24);
+    const Dataset& d = scene.dataset();
+    SurfaceOptions options{d.lattice, d.height_offset_m, d.height_quantum_m, 0, 1};
+    const std::vector<SurfaceVertex> vertices = surface_vertices(scene);
+    const auto [low, high] =
+        std::minmax_element(vertices.begin(), vertices.end(),
+                            [](const SurfaceVertex& a, const SurfaceVertex& b) { return a.height_n < b.height_n; });
+    options.low_n = static_cast<double>(low->height_n);
+    options.high_n = static_cast<double>(high->height_n);
+    return SurfaceRenderer::create(options, vertices);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<BlockDisplay>> BlockDisplay::create(const BlockScene& scene, const DisplayOptions& o) {
+    std::unique_ptr<BlockDisplay> display(new BlockDisplay(scene));
+    auto context = o.window
+                       ? create_window_context({"Scree", o.width_px, o.height_px, o.wait_for_refresh, o.visible_window})
+                       : create_headless_context();
+    if (!context) return context.error();
+    display->context_ = std::move(*context);
+    auto renderer = make_renderer(scene);
+    if (!renderer) return renderer.error();
+    display->renderer_ = std::move(*renderer);
+    if (auto ok = display->resize(o.width_px, o.height_px); !ok) return ok.error();
+    display->settings_ = scenery(scene.dataset());
+    if (auto ok = display->warm_up(); !ok) return ok.error();
+    return display;
+}
+
+// Drivers that compile at the first draw do so now.
+Result<void> BlockDisplay::warm_up() {
+    Camera camera;
+    camera.width_px = target_->width_px();
+    camera.height_px = target_->height_px();
+    const std::array<std::uint32_t, 3> triangle{0, 1, 2};
+    const std::array<std::span<const std::uint32_t>, 1> pieces{triangle};
+    FrameSettings settings = settings_;
+    settings.wait_until_drawn = true;
+    auto times = renderer_->draw(camera, pieces, settings, *target_);
+    if (!times) return times.error();
+    return {};
+}
+
+Result<void> BlockDisplay::resize(int width_px, int height_px) {
+    auto target = RenderTarget::create({width_px, height_px, 0});
+    if (!target) return target.error();
+    target_ = std::make_unique<RenderTarget>(std::move(*target));
+    return {};
+}
+
+Result<FrameTimes> BlockDisplay::draw(const Camera& camera) {
+    return renderer_->draw(camera, scene_.pieces(), settings_, *target_);
+}
+
+void BlockDisplay::show() {
+    if (context_->window() == nullptr) return;
+    target_->blit_to_window(target_->width_px(), target_->height_px());
+    context_->swap_buffers();
+}
+
+}  // namespace scree

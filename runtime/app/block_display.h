@@ -1,0 +1,37 @@
+// BlockDisplay: a context, a renderer and a target for a BlockScene, with or without a window: what Display is where
+// tiles are paged. OpenGL thread only.
+#pragma once
+
+#include <memory>
+
+#include "runtime/app/block_scene.h"
+#include "runtime/app/display.h"
+#include "runtime/render/surface_renderer.h"
+
+namespace scree {
+
+class BlockDisplay {
+public:
+    /// Size and window of the options. `scene` outlives the display.
+    static Result<std::unique_ptr<BlockDisplay>> create(const BlockScene& scene, const DisplayOptions& options);
+
+    GlContext& context() { return *context_; }
+    RenderTarget& target() { return *target_; }
+    FrameSettings& frame_settings() { return settings_; }
+    Result<void> resize(int width_px, int height_px);
+    /// What the scene has last selected.
+    Result<FrameTimes> draw(const Camera& camera);
+    void show();  ///< in the window, where there is one
+
+private:
+    explicit BlockDisplay(const BlockScene& scene) : scene_(scene) {}
+    Result<void> warm_up();
+
+    const BlockScene& scene_;
+    std::unique_ptr<GlContext> context_;  // goes last
+    std::unique_ptr<SurfaceRenderer> renderer_;
+    std::unique_ptr<RenderTarget> target_;
+    FrameSettings settings_;
+};
+
+}  // namespace scree

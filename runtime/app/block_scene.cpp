@@ -1,0 +1,123 @@
+#include "runtime/app/block_scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "runtime/view/frustum.h"
+
+namespace scree {
+
+Result<std::unique_ptr<BlockScene>> BlockScene::open(const TileStore& store, const SceneOptions& options) {
+    if (options.curvature == Curvature::on)
+        return Error{ErrorCode::usage,
+                     "--curvature on with --cracks dike: blocks are drawn flat, so nothing would be lowered"};
+    auto raster = read_height_raster(store, options.budget_bytes, kBytesPerSample);
+    if (!raster) return raster.error();
+    auto world = BlockWorld::make(*raster);
+    if (!world) return world.error();
+    return std::unique_ptr<BlockScene>(new BlockScene(store.dataset(), options.lod, options.tau_px, std::move(*world)));
+}
+
+BlockScene::BlockScene(const Dataset& dataset, const LodSettings& lod, double tau_px, BlockWorld world)
+    : dataset_(dataset),
+      lod_(lod),
+      rules_(block_rules(lod, tau_px)),
+      world_(std::move(world)),
+      drawn_(static_cast<std::size_t>(world_.block_count())) {}
+
+std::int64_t BlockScene::resident_bytes() const { return std::int64_t{world_.vertex_count()} * kBytesPerSample; }
+
+std::optional<double> BlockScene::promise_px() const {
+    if (!lod_.is_guaranteed()) return std::nullopt;
+    return lod_.promise_px(rules_.tau_px);
+}
+
+const BlockFrame& BlockScene::select(const Camera& camera) {
+    const BlockFrame& frame = world_.select(camera, rules_);
+    std::fill(drawn_.begin(), drawn_.end(), std::uint8_t{0});
+    pieces_.clear();
+    for (const std::int32_t block : frame.blocks) {
+        drawn_[static_cast<std::size_t>(block)] = 1;
+        pieces_.push_back(world_.mesh(block));
+    }
+    for (const std::int32_t strip : frame.strips) pieces_.push_back(world_.strip_mesh(strip));
+    for (const std::int32_t quad : frame.quads) pieces_.push_back(world_.quad_mesh(quad));
+    return frame;
+}
+
+LatticePoint BlockScene::lattice_point(std::uint32_t vertex) const {
+    const std::int64_t row = world_.bisection().row();
+    const std::int64_t in_block = vertex % world_.vertices_per_block(), block = vertex / world_.vertices_per_block();
+    return {block % world_.columns() * row + in_block % row, block / world_.columns() * row + in_block / row};
+}
+
+float BlockScene::height_n(std::uint32_t vertex) const {
+    const double n = (world_.position(vertex).z - dataset_.height_offset_m) / dataset_.height_quantum_m;
+    return static_cast<float>(std::nearbyint(n));  // heights are whole quanta; only the division rounds
+}
+
+DrawnMesh BlockScene::drawn_mesh() const {
+    DrawnMesh mesh;
+    for (const auto& piece : pieces_)
+        for (const std::uint32_t vertex : piece) {
+            const LatticePoint at = lattice_point(vertex);
+            mesh.corners.push_back(
+                {static_cast<std::int32_t>(at.i), static_cast<std::int32_t>(at.j), height_n(vertex), 0});
+        }
+    return mesh;
+}
+
+bool BlockScene::is_drawn(std::int64_t x, std::int64_t y) const {
+    return x < world_.columns() && y < world_.rows() && drawn_[static_cast<std::size_t>(y * world_.columns() + x)] != 0;
+}
+
+// By which blocks are drawn, and not by which strips and quads are: one that is missing leaves open edges.
+bool BlockScene::covers(std::int64_t i, std::int64_t j) const {
+    const std::int64_t row = world_.bisection().row(), x = i / row, y = j / row;
+    if (i < 0 || j < 0) return false;
+    const std::int64_t right = x + (i % row == row - 1 ? 1 : 0), below = y + (j % row == row - 1 ? 1 : 0);
+    return is_drawn(x, y) && is_drawn(right, y) && is_drawn(x, below) && is_drawn(right, below);
+}
+
+CrackReport BlockScene::count_cracks() const {
+    return scree::count_cracks(drawn_mesh(), [this](double i, double j) {
+        return covers(static_cast<std::int64_t>(std::floor(i)), static_cast<std::int64_t>(std::floor(j)));
+    });
+}
+
+std::int64_t BlockScene::count_holes(const Camera& camera) const {
+    std::int64_t holes = 0;
+    for (int block = 0; block < world_.block_count(); ++block) holes += count_holes(camera, block);
+    return holes;
+}
+
+// Of a block, and of the cells between it and those east and south of it.
+std::int64_t BlockScene::count_holes(const Camera& camera, int block) const {
+    const std::int64_t x = block % world_.columns(), y = block / world_.columns(), row = world_.bisection().row();
+    const std::int64_t right = std::min<std::int64_t>(x + 1, world_.columns() - 1),
+                       below = std::min<std::int64_t>(y + 1, world_.rows() - 1);
+    bool whole = true;
+    Box box = world_.box(block);
+    for (const auto& [bx, by] : {std::pair(x, y), std::pair(right, y), std::pair(x, below), std::pair(right, below)}) {
+        whole = whole && is_drawn(bx, by);
+        const Box& other = world_.box(static_cast<int>(by * world_.columns() + bx));
+        box = {glm::min(box.low, other.low), glm::max(box.high, other.high)};
+    }
+    const Frustum frustum(camera);
+    if (whole || !frustum.may_see(box)) return 0;
+    const auto sees = [&](std::int64_t i, std::int64_t j) {
+        const auto vertex = static_cast<std::uint32_t>(
+            (j / row * world_.columns() + i / row) * world_.vertices_per_block() + j % row * row + i % row);
+        return frustum.contains(world_.position(vertex));
+    };
+    const std::int64_t end_i = std::min((x + 1) * row, world_.columns() * row - 1),
+                       end_j = std::min((y + 1) * row, world_.rows() * row - 1);
+    std::int64_t holes = 0;
+    for (std::int64_t j = y * row; j < end_j; ++j)
+        for (std::int64_t i = x * row; i < end_i; ++i)
+            if (!covers(i, j) && (sees(i, j) || sees(i + 1, j) || sees(i, j + 1) || sees(i + 1, j + 1))) ++holes;
+    return holes;
+}
+
+}  // namespace scree
