@@ -4,39 +4,51 @@
 #     scripts/experiments.sh [OPTIONS]
 #
 #     --out FOLDER      where tables, charts and the page go (docs/experiments)
-#     --build FOLDER    the build to run (build/release); scree and scree_paper_tables must be there, the rest is run
-#                       where it has been built
-#     --quick           fewer rows and frames: a few seconds instead of minutes
+#     --build FOLDER    the build to run (build/release): scree, scree-view, scree_chart, scree_paper_tables, scree_claims
+#     --only PARTS      of paper,methods,deboer,ke,claims; the page keeps the others as they were
+#     --large           Ke et al. at full size: 4.3 GB are made, 6 GB of disk; otherwise a sixty-fourth
+#     --data FOLDER     where --large keeps what it made (not kept), in FOLDER/large
+#     --quick           fewer rows and frames: a minute instead of a quarter of an hour
 #
-# The landscape is made up (scree synth). Where SCREE_DATA is set, $SCREE_DATA/taipei/window_660_30m.tif is flown too:
-# the papers' own region. Times are CPU times of one thread; nothing else should run meanwhile.
+# The landscape is made up (scree synth). Where SCREE_DATA is set, $SCREE_DATA/taipei/window_660_30m.tif is flown too, the
+# papers' own region, and $SCREE_DATA/puget/ps_height_1k.png. Nothing else should run meanwhile.
 set -euo pipefail
 
 root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd -P)
-out=$root/docs/experiments build=$root/build/release quick=()
-usage() { sed -n 's/^# \{0,1\}//; 2,13p' "${BASH_SOURCE[0]}"; }
+. "$root/scripts/report_values.sh"
+. "$root/scripts/experiments_paged.sh"
+
+out=$root/docs/experiments build=$root/build/release only=paper,methods,deboer,ke,claims large=0 data='' quick=()
+usage() { sed -n 's/^# \{0,1\}//; 2,16p' "${BASH_SOURCE[0]}"; }
 while (($# > 0)); do
     case $1 in
-        --out | --build)
+        --out | --build | --only | --data)
             [[ $# -ge 2 ]] || { echo "$1 wants a value" >&2; exit 2; }
             printf -v "${1#--}" %s "$2"
             shift
             ;;
         --quick) quick=(--quick) ;;
+        --large) large=1 ;;
         -h | --help) usage; exit 0 ;;
         *) usage >&2; exit 2 ;;
     esac
     shift
 done
-scree=$build/tools/scree programs=$build/experiments
-for program in "$scree" "$programs/scree_paper_tables"; do
+scree=$build/tools/scree view=$build/runtime/scree-view programs=$build/experiments
+chart=$programs/scree_chart
+for program in "$scree" "$view" "$chart" "$programs/scree_paper_tables" "$programs/scree_claims"; do
     [[ -x $program ]] || { echo "$program is not there: build it first" >&2; exit 2; }
 done
+wanted() { [[ ,$only, == *,$1,* ]]; }
+if ((${#quick[@]})); then
+    deboer_taus=(2 8) deboer_frames=6 ke_frames=12 ke_poses=2 methods_taus=0.5,1 methods_frames=2 methods_rounds=1
+else
+    deboer_taus=(1 2 4 8 16) deboer_frames=24 ke_frames=48 ke_poses=2 methods_taus=0.5,0.71,1,1.41,2 methods_frames=5 methods_rounds=2
+fi
 
 work=$(mktemp -d)
 trap 'rm -rf -- "$work"' EXIT
 mkdir -p -- "$out" "$work/parts"
-parts=10 # numbers the parts of the page, in order
 out=$(cd -- "$out" && pwd -P)
 
 # ---- stores ----
@@ -59,11 +71,30 @@ tables() {
     echo "scree_paper_tables: $2" >&2
     "$programs/scree_paper_tables" --store "$work/$1.scree" --out "$out" --name "$1" --title "$2" \
         ${quick[@]+"${quick[@]}"} 2>"$work/$1.log" || { cat "$work/$1.log" >&2; exit 1; }
-    mv -- "$out/paper_$1.md" "$work/parts/$parts-paper_$1.md"
-    parts=$((parts + 1))
+    mv -- "$out/paper_$1.md" "$work/parts/paper_$1.md"
 }
-[[ -z $taipei ]] || tables taipei "Taipei: a window of the papers' region"
-tables synth "A made-up landscape"
+if wanted paper; then
+    [[ -z $taipei ]] || tables taipei "Taipei: a window of the papers' region"
+    tables synth "A made-up landscape"
+fi
+
+# ---- de Boer, Ke et al., and all methods side by side: scripts/experiments_paged.sh ----
+
+if wanted deboer; then
+    echo "de Boer" >&2
+    deboer
+fi
+if wanted ke; then
+    echo "Ke et al." >&2
+    ke
+fi
+if wanted methods; then
+    echo "methods" >&2
+    [[ -z $taipei ]] || methods taipei "Taipei, 660 x 660 heights" "$work/taipei.scree"
+    "$scree" synth -o "$work/scenery" --size 1025 --spacing 20 --quiet
+    "$scree" build "$work/scenery/dem.tif" --imagery "$work/scenery/ortho.tif" -o "$work/scenery.scree" --quiet
+    methods synth "a made-up landscape, 1025 x 1025 heights, 4096 x 4096 texels" "$work/scenery.scree"
+fi
 
 # ---- claims of the papers that fail ----
 
@@ -77,21 +108,26 @@ claims_part() {
         [[ ! -f $chart ]] || printf '![%s](claims/%s)\n' "$(basename -- "$chart" .svg)" "${chart##*/}"
     done
 }
-if [[ -x $programs/scree_claims ]]; then
+if wanted claims; then
     echo scree_claims >&2
     terrain=$work/synth.scree
     [[ -z $taipei ]] || terrain=$work/taipei.scree
     "$programs/scree_claims" --store "$terrain" --out "$out/claims" ${quick[@]+"${quick[@]}"} >"$work/claims.txt" ||
         echo "scree_claims: a verdict is not as theory has it" >&2
-    claims_part >"$work/parts/$parts-claims.md"
-    parts=$((parts + 1))
+    claims_part >"$work/parts/claims.md"
 fi
 
-# ---- Ke et al. and de Boer ----
-# Their programs go here, each run where it has been built: tables and charts into $out, its part of the page into
-# $work/parts/$parts-NAME.md.
-
 # ---- the page ----
+
+# part NAME: made now, or as the page had it.
+part() {
+    printf '<!-- part %s -->\n\n' "$1"
+    if [[ -f $work/parts/$1.md ]]; then
+        cat -- "$work/parts/$1.md"
+    elif [[ -f $out/README.md ]]; then
+        awk -v mark="<!-- part $1 -->" '/^<!-- part / { inside = $0 == mark; next } inside && (NF || any) { any = 1; print }' "$out/README.md"
+    fi
+}
 
 page() {
     cat <<'END'
@@ -108,7 +144,8 @@ error, by the paper's own measure, of a vertex that is not selected. **Greatest 
 over all vertices in view, and over the insides of strips. **LOD ms**: culling, reuse tests, selections, meshes and dikes of a frame; the first frame apart.
 END
     printf '\nMachine: %s.\n\n' "$(lscpu | sed -n 's/^Model name: *//p' | head -n 1), one thread"
-    cat -- "$work"/parts/*.md
+    local name
+    for name in paper_taipei paper_synth methods_taipei methods_synth deboer ke claims; do part "$name"; done
 }
 
 page >"$work/README.md"
