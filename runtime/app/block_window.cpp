@@ -20,6 +20,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+/// Dear ImGui shows a text that grew in the frame after the one that it measures it in.
+constexpr int kFramesOfAChange = 2;
+
 class Window {
 public:
     Window(ViewOptions& o, const BlockWindow& w, BlockScene& scene, BlockDisplay& display,
@@ -47,7 +50,7 @@ public:
             move(std::chrono::duration<double>(now - last).count());
             last = now;
             take_keys();
-            if (!redraw_ && !controls_.moved()) {
+            if (to_draw_ == 0 && !controls_.moved()) {
                 // Nothing changes: leave the core alone.
                 glfwWaitEventsTimeout(0.1);
                 continue;
@@ -72,7 +75,7 @@ private:
         if (width <= 0 || height <= 0 || (width == options_.width_px && height == options_.height_px)) return {};
         options_.width_px = std::min(width, 16384);
         options_.height_px = std::min(height, 16384);
-        redraw_ = true;
+        to_draw_ = kFramesOfAChange;
         return display_.resize(options_.width_px, options_.height_px);
     }
 
@@ -85,7 +88,7 @@ private:
         const auto toggle = [&](int key, bool& value) {
             const int presses = controls_.take_presses(key);
             value = value != (presses % 2 == 1);
-            redraw_ = redraw_ || presses > 0;
+            if (presses > 0) to_draw_ = kFramesOfAChange;
         };
         toggle(GLFW_KEY_F, display_.frame_settings().wireframe);
         toggle(GLFW_KEY_H, show_hud_);
@@ -94,7 +97,7 @@ private:
         if (steps == 0) return;
         wanted_tau_px_ *= std::pow(1.25, steps);
         governor_ = governor(wanted_tau_px_);
-        redraw_ = true;
+        to_draw_ = kFramesOfAChange;
     }
 
     Result<void> draw() {
@@ -107,7 +110,8 @@ private:
         display_.target().blit_to_window(options_.width_px, options_.height_px);
         const double frame_s = std::chrono::duration<double>(Clock::now() - start).count();
         mean_frame_s_ = mean_frame_s_ > 0 ? 0.9 * mean_frame_s_ + 0.1 * frame_s : frame_s;
-        redraw_ = asked_.fps > 0 && governor_.next(1000 * frame_s) != scene_.tau_px();
+        to_draw_ = std::max(to_draw_ - 1, 0);
+        if (asked_.fps > 0 && governor_.next(1000 * frame_s) != scene_.tau_px()) to_draw_ = std::max(to_draw_, 1);
         if (show_hud_) hud_.draw(status_lines(frame));
         display_.context().swap_buffers();
         return {};
@@ -142,7 +146,8 @@ private:
     FrameGovernor governor_;
     double wanted_tau_px_;
     double mean_frame_s_ = 0;
-    bool show_hud_ = true, redraw_ = true;
+    bool show_hud_ = true;
+    int to_draw_ = kFramesOfAChange;  ///< frames, though nothing moves
 };
 
 }  // namespace

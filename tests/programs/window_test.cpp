@@ -133,6 +133,31 @@ TEST_F(Window, ShowsTheTerrainMovesAndCloses) {
     EXPECT_NE(first.rgb, second.rgb) << "keys moved nothing";
 }
 
+TEST_F(Window, ShowsBlocksAndDikes) {
+    Screenshot first, second;
+    int step = 0;
+    const auto start = std::chrono::steady_clock::now();
+    ProgramOptions options = options_;
+    options.meanwhile = [&] {
+        const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        if (step == 0 && seconds > 2) {
+            if (on_path("import")) first = screenshot(options_, folder_.file("1.png"));
+            key("key", "f");
+            ++step;
+        } else if (step == 1 && seconds > 3) {
+            if (on_path("import")) second = screenshot(options_, folder_.file("2.png"));
+            key("key", "Escape");
+            ++step;
+        }
+    };
+    const auto run = scree_view({store_, "--lod", "rsg", "--cracks", "dike", "--size", "640x480"}, options);
+    EXPECT_EQ(run.exit_code, 0) << describe(run);
+    EXPECT_EQ(step, 2) << "the window closed before its keys were pressed\n" << describe(run);
+    if (!on_path("import")) GTEST_SKIP() << "without import (ImageMagick) nobody looks at the picture";
+    EXPECT_GT(first.colours, 500u) << "a picture of one colour shows no terrain";
+    EXPECT_NE(first.rgb, second.rgb) << "F draws edges only";
+}
+
 TEST_F(Window, ClosesOnEscape) {
     int waited = 0;
     ProgramOptions options = options_;

@@ -130,6 +130,7 @@ TEST(LodMethods, CommandLinesSayTheSettingsAgain) {
 
 TEST(LodMethods, WhatIsNotBuiltInIsRefusedByItsCommandLine) {
     EXPECT_TRUE(expect_built_in({}));
+    EXPECT_TRUE(expect_built_in(*lod_settings_from(options("rsg", "uc", "paper", 0.1, "box", "dike"))));
     LodSettings nonsense;
     nonsense.metric = ErrorMetric::uc;  // with geomip: no command line makes it
     const auto refused = expect_built_in(nonsense);
