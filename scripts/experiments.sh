@@ -43,7 +43,7 @@ wanted() { [[ ,$only, == *,$1,* ]]; }
 if ((${#quick[@]})); then
     deboer_taus=(2 8) deboer_frames=6 ke_frames=12 ke_poses=2 methods_taus=0.5,1 methods_frames=2 methods_rounds=1
 else
-    deboer_taus=(1 2 4 8 16) deboer_frames=24 ke_frames=48 ke_poses=2 methods_taus=0.5,0.71,1,1.41,2 methods_frames=5 methods_rounds=2
+    deboer_taus=(1 2 4 8 16) deboer_frames=24 ke_frames=48 ke_poses=2 methods_taus=0.5,0.71,1,2 methods_frames=4 methods_rounds=2
 fi
 
 work=$(mktemp -d)

@@ -17,7 +17,7 @@ run_view() {
 }
 of() { report_value "$work/$1.json" "$2"; }
 
-# For awk over CSV with a header: v(COLUMN) of the line; promise() and grouped() (131072 as 131,072) for tables.
+# For awk over CSV with a header: v(COLUMN) of the line, a text (+ 0 makes it a number); promise() and grouped() (131072 as 131,072) for tables.
 csv_awk='
     function fields(line, into,    n, k, c, quoted) {
         n = 1; into[1] = ""; quoted = 0
@@ -38,6 +38,9 @@ csv_awk='
     FNR == 1 { count = fields($0, names); for (k = 1; k <= count; ++k) at[names[k]] = k; next }
     { fields($0, f) }
     function v(name) { return f[at[name]] }'
+
+# load: what a page says of the machine beside times.
+load() { printf 'Load of the machine when this was written: %s on %s cores.' "$(cut -d ' ' -f 2 /proc/loadavg)" "$(nproc)"; }
 
 # ---- de Boer: 257 x 257, blocks of 17 x 17 ----
 
@@ -126,7 +129,7 @@ ke_rows() {
                 -v ms="$(of ke_fly frame_ms.median)" -v p99="$(of ke_fly frame_ms.p99)" -v select_ms="$(of ke_fly select_ms.median)" \
                 -v rss="$(of ke_fly tile_rss_bytes)" -v stand="$(of ke_fly frames_with_stand_ins)" -v holes="$(of ke_audit holes)" \
                 -v samples="$(of ke_audit samples)" -v worst="$(of ke_audit max_error_px)" 'BEGIN {
-                    printf "\"%s^2, %d levels\",%s,%s,%s,%.1f,%.1f,%.0f,%.1f,%.2f,%.2f,%.1f,%.4f,%.1f,%d,%d,%d,%.4f,%.4f,\"%s^2, tau %s\"\n",
+                    printf "\"%s^2, %d levels\",%s,%s,%s,%.1f,%.1f,%.0f,%.1f,%.2f,%.2f,%.2f,%.4f,%.1f,%d,%d,%d,%.4f,%.4f,\"%s^2, tau %s\"\n",
                         tile, levels, levels, tau, cull, bytes / 1e6, seconds, tri, tiles, ms, p99, 1000 / ms, select_ms, rss / 1e6,
                         stand, holes, samples, 100 * holes / (holes + samples), worst, tile, tau }' >>"$csv"
         done
@@ -139,17 +142,18 @@ ke_page() {
 Ke et al. print 30 minutes of building and 700 MB of pyramid for their 4 GB in seven levels, and, for one run, both 15 and 60 frames a second. Frames here are of
 a software renderer on cores that other work shares: only columns of one run compare, and only as ratios. "box" tests a tile's box against the frustum,
 "corners" draws a tile where one of its four corners is in view, as published. Lost: finest cells in view under no drawn tile, of those and the vertices in view,
-complete poses. Budget 256M. The prototype loses 1.1 to 2.1 % of the visible tiles of 1.3 km, 10.7 to 15.8 % of 5.3 km, 29 to 45 % of 21 km, over random cameras.
+complete poses (an audit judges every finest vertex of this much terrain, so there are few). Budget 256M. The prototype loses 1.1 to 2.1 % of the visible tiles of 1.3 km, 10.7 to 15.8 % of 5.3 km, 29 to 45 % of 21 km, over random cameras.
 
 | tiles | store MB | built in s | tau | cull | triangles | tiles drawn | frame ms, median | p99 | fps | of box | select ms | tile memory MB | frames with stand-ins | lost cells | lost % | greatest error px of what is drawn |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 END
     awk "$csv_awk"'{
         if (v("cull") == "box") box = v("frame_ms")
-        printf "| %s | %.0f | %.0f | %s | %s | %s | %.0f | %.1f | %.1f | %.1f | %.2f | %.3f | %.0f | %d | %s | %.2f | %.2f |\n", v("store"), v("store_mb"),
+        printf "| %s | %.0f | %.0f | %s | %s | %s | %.0f | %.0f | %.0f | %.2f | %.2f | %.3f | %.0f | %d | %s | %.3f | %.2f |\n", v("store"), v("store_mb"),
             v("build_s"), v("tau_px"), v("cull"), grouped(v("triangles_mean")), v("tiles_mean"), v("frame_ms"), v("frame_p99_ms"), v("fps"),
             box / v("frame_ms"), v("select_ms"), v("tile_mb"), v("stand_ins"), grouped(v("lost_cells")), v("lost_percent"), v("true_max_px")
     }' "$out/ke.csv"
+    printf '\n%s\n' "$(load)"
     printf '\n![Cells lost](ke_lost.svg)\n![Frames a second](ke_fps.svg)\n\n'
 }
 
@@ -170,6 +174,12 @@ ke() {
         ke_rows "$csv" "$work/ke.scree" "$tile" "$work/ke_build.json"
         rm -f -- "$work/ke.scree"
     done
+    show_ke "$title"
+}
+
+# show_ke TITLE: charts and part of the page of what ke measured.
+show_ke() {
+    local csv=$out/ke.csv title=$1
     "$chart" "$csv" -o "$out/ke_lost.svg" --bars --x group --y lost_percent --series cull --title "Terrain lost by culling" \
         --subtitle "$title; $ke_poses complete poses of the default flight" --x-label "tiles, tolerance" --y-label "cells lost (%)"
     "$chart" "$csv" -o "$out/ke_fps.svg" --bars --x group --y fps --series cull --title "Frames a second" \
@@ -190,7 +200,7 @@ methods_of() {
 # within_one NAME: of every method the case of fewest triangles whose greatest error is within a pixel.
 within_one() {
     awk "$csv_awk"'
-        v("true_max_px") <= 1 && v("holes") == 0 && v("open_edges") == 0 {
+        v("true_max_px") + 0 <= 1 && v("holes") == 0 && v("open_edges") == 0 {
             m = v("method")
             if (!(m in best)) { order[++n] = m }
             if (!(m in best) || v("triangles_mean") + 0 < best[m] + 0) { best[m] = v("triangles_mean"); line[m] = $0 }
@@ -215,6 +225,7 @@ END
             grouped(v("triangles_mean")), v("tile_bytes") / 1e6, v("lod_ms"), v("lod_ms") / lod, v("lod_cold_ms"), v("frame_ms"), v("frame_ms") / frame,
             v("true_max_px"), v("true_p99_px"), v("true_mean_px"), promise(v("guaranteed"), v("promised_px"), v("kept")), v("psnr_db") }' \
         "$out/methods_$name.csv" "$out/methods_$name.csv"
+    printf '\n%s\n' "$(load)"
     cat <<'END'
 
 ### A frame whose audited error is at most 1 px
@@ -235,15 +246,19 @@ END
 
 # methods NAME TITLE STORE
 methods() {
-    local name=$1 title=$2 store=$3 spot csv
+    local name=$1 title=$2 store=$3
     run_view "compare_$name" compare "$store" --taus "$methods_taus" --frames "$methods_frames" --rounds "$methods_rounds" --quiet \
         --csv "$work/compare_$name.csv"
-    csv=$out/methods_$name.csv
-    head -n 1 "$work/compare_$name.csv" >"$csv"
-    methods_of "$name" >>"$csv"
+    { head -n 1 "$work/compare_$name.csv"; methods_of "$name"; } >"$out/methods_$name.csv"
+    show_methods "$name" "$title"
+}
+
+# show_methods NAME TITLE: charts and part of the page of what methods measured.
+show_methods() {
+    local name=$1 title=$2 spot csv=$out/methods_$1.csv
     { head -n 1 "$csv"; within_one "$name"; } >"$work/within_$name.csv"
     # What is drawn without error would stretch the axis by decades; cached meshes have the triangles of rsg.
-    { head -n 1 "$csv"; awk "$csv_awk"'v("true_max_px") >= 0.01' "$csv"; } >"$work/erring_$name.csv"
+    { head -n 1 "$csv"; awk "$csv_awk"'v("true_max_px") + 0 >= 0.01' "$csv"; } >"$work/erring_$name.csv"
     grep -Ev '^tolerance,rsg (exact|P1),' "$work/erring_$name.csv" >"$work/uncached_$name.csv"
     spot="$title; $methods_frames poses, 800 x 800 px, tau ${methods_taus//,/ }"
     "$chart" "$work/within_$name.csv" -o "$out/methods_${name}_frame.svg" --bars --x method --y frame_ms --title "Frame time at an audited error of at most 1 px" \
