@@ -18,8 +18,8 @@ public:
     GlContext& context() { return *context_; }
     RenderTarget& target() { return *target_; }
     FrameSettings& frame_settings() { return settings_; }
-    /// Lets go of one scene for another, in the same context. Settings stay, but for those that go by its heights. After
-    /// an error nothing can be drawn.
+    /// Lets go of one scene for another, in the same context. Settings stay, but for those that go by its heights.
+    /// After an error nothing can be drawn.
     Result<void> change_to(const BlockScene& scene);
     Result<void> resize(int width_px, int height_px);
     /// What the scene has last selected.

@@ -51,12 +51,11 @@ void BlockStage::describe(HudModel& model) const {
     const auto promise_px = scene_->promise_px();
     model.picture.push_back({"drawn", fmt::format("{} triangles in {} blocks, {} strips", grouped(frame_.triangles()),
                                                   frame_.blocks.size(), frame_.strips.size())});
-    model.picture.push_back(
-        {"error", promise_px ? fmt::format("within {:.2f} px, tau {:.2f}", *promise_px, scene_->tau_px())
-                             : fmt::format("not promised, tau {:.2f}", scene_->tau_px())});
+    model.picture.push_back({"error", promise_px
+                                          ? fmt::format("within {:.2f} px, tau {:.2f}", *promise_px, scene_->tau_px())
+                                          : fmt::format("not promised, tau {:.2f}", scene_->tau_px())});
     model.picture.push_back({"method", command_line_of(options_.lod).substr(6)});
-    model.picture.push_back(
-        {"blocks", fmt::format("{} reused, {} meshes made", frame_.reused, frame_.meshes_made)});
+    model.picture.push_back({"blocks", fmt::format("{} reused, {} meshes made", frame_.reused, frame_.meshes_made)});
     const std::int64_t held = scene_->resident_bytes();
     model.memory.push_back({"memory",
                             fmt::format("{} of {} MB, all of it", megabytes(held), megabytes(options_.budget_bytes)),
@@ -72,10 +71,14 @@ std::optional<std::string> BlockStage::refusal(Action action) const {
     switch (action) {
         case Action::colour_by_level:
         case Action::colour_by_geomip:
-        case Action::colour_by_error: return "Blocks (--cracks dike) have no levels to colour by.";
-        case Action::second_view: return "Blocks (--cracks dike) are chosen for one view alone.";
-        case Action::next_method: return "Blocks (--cracks dike) are one method: start without them to change it.";
-        default: return std::nullopt;
+        case Action::colour_by_error:
+            return "Blocks (--cracks dike) have no levels to colour by.";
+        case Action::second_view:
+            return "Blocks (--cracks dike) are chosen for one view alone.";
+        case Action::next_method:
+            return "Blocks (--cracks dike) are one method: start without them to change it.";
+        default:
+            return std::nullopt;
     }
 }
 

@@ -13,8 +13,7 @@ namespace scree {
 class BlockStage final : public Stage {
 public:
     /// Reads the raster and opens the window. Errors: those of BlockScene and BlockDisplay.
-    static Result<std::unique_ptr<Stage>> create(const ViewOptions& options,
-                                                 std::shared_ptr<const SqliteStore> store);
+    static Result<std::unique_ptr<Stage>> create(const ViewOptions& options, std::shared_ptr<const SqliteStore> store);
 
     const Dataset& dataset() const override { return scene_->dataset(); }
     std::shared_ptr<const TileStore> store() const override { return store_; }

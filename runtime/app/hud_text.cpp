@@ -7,10 +7,14 @@
 namespace scree {
 
 std::string grouped(std::int64_t count) {
-    std::string digits = fmt::format("{}", count);
-    const std::size_t first = count < 0 ? 1 : 0;
-    for (std::size_t at = digits.size(); at > first + 3;) digits.insert(at -= 3, " ");
-    return digits;
+    const std::string digits = fmt::format("{}", count);
+    std::string words;
+    for (std::size_t k = 0; k < digits.size(); ++k) {
+        const bool group_begins = k > 0 && digits[k - 1] != '-' && (digits.size() - k) % 3 == 0;
+        if (group_begins) words.push_back(' ');
+        words.push_back(digits[k]);
+    }
+    return words;
 }
 
 std::string length_text(double metres) {

@@ -18,9 +18,12 @@ constexpr double kCatchUp_s = 0.08;
 /// The order in which a key goes through them.
 LodMethod after(LodMethod method) {
     switch (method) {
-        case LodMethod::geomip: return LodMethod::block_rsg;
-        case LodMethod::block_rsg: return LodMethod::rsg;
-        case LodMethod::rsg: return LodMethod::geomip;
+        case LodMethod::geomip:
+            return LodMethod::block_rsg;
+        case LodMethod::block_rsg:
+            return LodMethod::rsg;
+        case LodMethod::rsg:
+            return LodMethod::geomip;
     }
     return LodMethod::geomip;
 }
@@ -133,14 +136,13 @@ void PagedStage::describe_tiles(HudModel& model) const {
     const Pager& pager = scene_->pager();
     const Pager::Occupancy heights = pager.occupancy(TileKind::height), textures = pager.occupancy(TileKind::texture);
     const Selection& s = *frame_.selection;
-    std::string tiles = fmt::format("{} planned, {} wanted, {} on their way",
-                                    s.planned_heights.size() + s.planned_textures.size(), s.requests.size(),
-                                    heights.loading + textures.loading);
+    std::string tiles =
+        fmt::format("{} planned, {} wanted, {} on their way", s.planned_heights.size() + s.planned_textures.size(),
+                    s.requests.size(), heights.loading + textures.loading);
     if (scene_->updates() > 0) tiles += fmt::format(", update {}", scene_->updates());
     model.picture.push_back({"tiles", tiles});
     const MemoryPlan& memory = scene_->memory();
-    model.memory.push_back(
-        slots_bar("heights", heights.resident, memory.height_slots, height_slot_cost(dataset())));
+    model.memory.push_back(slots_bar("heights", heights.resident, memory.height_slots, height_slot_cost(dataset())));
     model.memory.push_back(
         slots_bar("textures", textures.resident, memory.texture_slots, texture_slot_cost(dataset())));
 }
@@ -170,7 +172,8 @@ void PagedStage::describe_legend(HudModel& model) const {
         model.legend_title = "drawn sparser than stored";
         std::set<int> strides;
         for (const DrawItem& item : frame_.selection->draws[0]) strides.insert(item.geomip);
-        for (const int stride : strides) add(stride, stride == 0 ? "every sample" : fmt::format("1 in {}", 1 << stride));
+        for (const int stride : strides)
+            add(stride, stride == 0 ? "every sample" : fmt::format("1 in {}", 1 << stride));
     } else if (highlight == Highlight::error) {
         model.legend_title = "off the finest data by up to";
         for (const int quarter : {0, 1, 2, 3, 4})
@@ -198,8 +201,7 @@ LodSettings PagedStage::settings_of(LodMethod method) const {
 Result<std::string> PagedStage::next_method() {
     const LodSettings lod = settings_of(after(scene_->options().lod.method));
     auto next = open_scene(scene_->shared_store(), lod);
-    if (!next)
-        return fmt::format("{} stays: {}", to_string(scene_->options().lod.method), next.error().message);
+    if (!next) return fmt::format("{} stays: {}", to_string(scene_->options().lod.method), next.error().message);
     if (auto ok = change_to(std::move(*next)); !ok) return ok.error();
     return fmt::format("Method: {}", command_line_of(lod).substr(6));
 }

@@ -13,8 +13,7 @@ namespace scree {
 class PagedStage final : public Stage {
 public:
     /// Opens the window. Errors: those of Scene and Display.
-    static Result<std::unique_ptr<Stage>> create(const ViewOptions& options,
-                                                 std::shared_ptr<const SqliteStore> store);
+    static Result<std::unique_ptr<Stage>> create(const ViewOptions& options, std::shared_ptr<const SqliteStore> store);
 
     const Dataset& dataset() const override { return scene_->dataset(); }
     std::shared_ptr<const TileStore> store() const override { return scene_->shared_store(); }

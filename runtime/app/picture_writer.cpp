@@ -24,11 +24,11 @@ Result<std::filesystem::path> next_free_file(const std::filesystem::path& folder
             return file;
         }
         if (trouble)
-            return Error{ErrorCode::io, fmt::format("{}: {}: nothing can be written there", file.string(),
-                                                    trouble.message())};
+            return Error{ErrorCode::io,
+                         fmt::format("{}: {}: nothing can be written there", file.string(), trouble.message())};
     }
-    return Error{ErrorCode::io, fmt::format("scree-{}-001.{} to {}: all taken; move them away", name, extension,
-                                            kNumbers)};
+    return Error{ErrorCode::io,
+                 fmt::format("scree-{}-001.{} to {}: all taken; move them away", name, extension, kNumbers)};
 }
 
 void PictureWriter::write(const std::filesystem::path& file, int width_px, int height_px,

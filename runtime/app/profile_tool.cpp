@@ -17,8 +17,8 @@ std::string metres(double length_m) {
 
 std::string words_of(const ProfileSummary& s) {
     if (!s.low_m) return fmt::format("{} long, no ground along it", metres(s.length_m));
-    return fmt::format("{} long   lowest {:.1f} m   highest {:.1f} m   up {:.0f} m   down {:.0f} m",
-                       metres(s.length_m), *s.low_m, *s.high_m, s.ascent_m, s.descent_m);
+    return fmt::format("{} long   lowest {:.1f} m   highest {:.1f} m   up {:.0f} m   down {:.0f} m", metres(s.length_m),
+                       *s.low_m, *s.high_m, s.ascent_m, s.descent_m);
 }
 
 glm::dvec2 place_of(const Profile& profile, std::size_t k) {
@@ -105,17 +105,14 @@ std::vector<LineSegment> ProfileTool::course(double lift_m) const {
     const Profile& p = *profile_;
     for (std::size_t k = 1; k < p.points.size(); ++k) {
         const auto &a = p.points[k - 1].height_m, &b = p.points[k].height_m;
-        if (a && b)
-            lines.push_back({{place_of(p, k - 1), *a + lift_m}, {place_of(p, k), *b + lift_m}, kCourse});
+        if (a && b) lines.push_back({{place_of(p, k - 1), *a + lift_m}, {place_of(p, k), *b + lift_m}, kCourse});
     }
     return lines;
 }
 
 std::vector<LineSegment> ProfileTool::lines(double mark_m) const {
     std::vector<LineSegment> lines;
-    const auto mark = [&](const glm::dvec3& foot) {
-        lines.push_back({foot, foot + glm::dvec3(0, 0, mark_m), kMark});
-    };
+    const auto mark = [&](const glm::dvec3& foot) { lines.push_back({foot, foot + glm::dvec3(0, 0, mark_m), kMark}); };
     if (profile_) lines = course(0.02 * mark_m);
     for (const glm::dvec3& end : ends_) lines.push_back({end, end + glm::dvec3(0, 0, 0.5 * mark_m), kCourse});
     if (profile_ && pointed_at_ && *pointed_at_ < profile_->points.size()) {

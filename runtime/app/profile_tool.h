@@ -19,8 +19,8 @@ namespace scree {
 /// What a profile says in short. Heights in metres as the ground has them.
 struct ProfileSummary {
     double length_m = 0;
-    std::optional<double> low_m, high_m;   ///< none: no ground along it
-    double ascent_m = 0, descent_m = 0;    ///< summed over neighbouring points that both have ground
+    std::optional<double> low_m, high_m;  ///< none: no ground along it
+    double ascent_m = 0, descent_m = 0;   ///< summed over neighbouring points that both have ground
 };
 /// `exaggeration`: of the profile's heights.
 ProfileSummary summary_of(const Profile& profile, double exaggeration);

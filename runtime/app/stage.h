@@ -1,5 +1,5 @@
-// Stage: what a window shows and how it is chosen: tiles through a Scene (PagedStage) or the paper's blocks (BlockStage).
-// Owns the context, so it outlives all else of OpenGL in the window. Frame-loop thread only.
+// Stage: what a window shows and how it is chosen: tiles through a Scene (PagedStage) or the paper's blocks
+// (BlockStage). Owns the context, so it outlives all else of OpenGL in the window. Frame-loop thread only.
 #pragma once
 
 #include <memory>

@@ -102,9 +102,8 @@ HudAnswer Hud::draw(const HudModel& model) {
 }
 
 bool Hud::takes_mouse_at(const glm::dvec2& at) const {
-    return std::any_of(panels_.begin(), panels_.end(), [&](const glm::dvec4& p) {
-        return at.x >= p.x && at.y >= p.y && at.x < p.z && at.y < p.w;
-    });
+    return std::any_of(panels_.begin(), panels_.end(),
+                       [&](const glm::dvec4& p) { return at.x >= p.x && at.y >= p.y && at.x < p.z && at.y < p.w; });
 }
 
 }  // namespace scree

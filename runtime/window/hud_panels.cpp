@@ -79,8 +79,8 @@ constexpr float kKey_em = 8;
 void key_line(std::string_view name, std::string_view does, bool greyed) {
     if (greyed) ImGui::PushStyleColor(ImGuiCol_Text, ImGui::GetStyleColorVec4(ImGuiCol_TextDisabled));
     const float left = ImGui::GetCursorPosX();
-    ImGui::PushStyleColor(ImGuiCol_Text, greyed ? ImGui::GetStyleColorVec4(ImGuiCol_TextDisabled)
-                                                : ImVec4(0.65f, 0.85f, 1, 1));
+    ImGui::PushStyleColor(ImGuiCol_Text,
+                          greyed ? ImGui::GetStyleColorVec4(ImGuiCol_TextDisabled) : ImVec4(0.65f, 0.85f, 1, 1));
     text(std::string(name));
     ImGui::PopStyleColor();
     ImGui::SameLine(left + kKey_em * em());

@@ -13,16 +13,6 @@ namespace {
 constexpr double kClickTravel_px = 4;
 constexpr double kClick_s = 0.4;
 
-std::optional<Action> action_of(int key, bool shift) {
-    std::optional<Action> plain;
-    for (const KeyBinding& binding : key_bindings()) {
-        if (binding.key != key) continue;
-        if (binding.shift == shift) return binding.action;
-        if (!binding.shift) plain = binding.action;  // Shift means nothing to it
-    }
-    return plain;
-}
-
 }  // namespace
 
 WindowInput::WindowInput(GLFWwindow* window) : window_(window) {
@@ -76,7 +66,8 @@ void WindowInput::watch_mouse() {
 void WindowInput::press_key(int key, int modifiers) {
     down_.insert(key);
     tapped_.insert(key);
-    if (const auto action = action_of(key, (modifiers & GLFW_MOD_SHIFT) != 0)) taken_.actions.push_back(*action);
+    if (const KeyBinding* binding = binding_of(key, (modifiers & GLFW_MOD_SHIFT) != 0))
+        taken_.actions.push_back(binding->action);
 }
 
 void WindowInput::press_button(int button) {

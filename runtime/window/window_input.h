@@ -19,8 +19,8 @@ namespace scree {
 
 /// What was done since the last taking. Places are in pixels of the framebuffer, from the top left.
 struct TakenInput {
-    std::vector<Action> actions;  ///< in the order of their keys
-    RigInput rig;                 ///< but for the seconds
+    std::vector<Action> actions;          ///< in the order of their keys
+    RigInput rig;                         ///< but for the seconds
     std::optional<glm::dvec2> click_px;   ///< of the left button, which went up where it had gone down
     std::optional<glm::dvec2> cursor_px;  ///< none: beyond the window, or over what takes the mouse for itself
     bool anything = false;                ///< an event of any kind came: also a mouse that only moves
