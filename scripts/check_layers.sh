@@ -54,6 +54,10 @@ forbid "$below_render" 'runtime/render/|runtime/scene/|runtime/app/' \
 forbid "$below_render runtime/scene" "$window" "runtime/view, paging, lod and scene know no window:"
 forbid runtime/render 'runtime/scene/|runtime/app/' "runtime/render lies below scene_renderer and app:"
 forbid runtime/scene 'runtime/app/' "runtime/scene lies below app:"
+forbid runtime/window 'runtime/app/|runtime/lod/|runtime/paging/|runtime/render/|runtime/scene/' \
+    "runtime/window lies below app and beside what is drawn:"
+forbid runtime/window "$window" "of runtime/window, window_input and hud alone know the window, key_table its keys:" \
+    'runtime/window/(window_input|hud)\.|runtime/window/key_table\.cpp:[0-9]+:#include <GLFW/glfw3\.h>'
 forbid runtime/scene 'runtime/render/' "of runtime/scene, scene_renderer alone knows the renderer:" \
     'runtime/scene/scene_renderer\.'
 forbid "tools runtime" "$opengl" "OpenGL and EGL headers stand in runtime/render alone:" 'runtime/render/'

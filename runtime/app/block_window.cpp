@@ -11,7 +11,7 @@
 #include "runtime/app/block_display.h"
 #include "runtime/app/block_scene.h"
 #include "runtime/app/fly_controls.h"
-#include "runtime/app/ground_probe.h"
+#include "runtime/window/ground_probe.h"
 #include "runtime/app/hud.h"
 #include "runtime/scene/frame_governor.h"
 
@@ -32,7 +32,7 @@ public:
           scene_(scene),
           display_(display),
           window_(display.context().window()),
-          ground_(std::move(store)),
+          ground_(std::move(store), {}),
           controls_(window_, overview(scene.dataset(), o.fov_deg, static_cast<double>(o.width_px) / o.height_px),
                     extent_m(scene.dataset())),
           hud_(window_),

@@ -11,7 +11,7 @@
 #include "runtime/app/commands.h"
 #include "runtime/app/display.h"
 #include "runtime/app/fly_controls.h"
-#include "runtime/app/ground_probe.h"
+#include "runtime/window/ground_probe.h"
 #include "runtime/app/hud.h"
 #include "runtime/app/view_options.h"
 #include "runtime/scene/frame_governor.h"
@@ -86,7 +86,7 @@ Result<void> view(ViewOptions o, const WindowSettings& w) {
     auto display = Display::create(**scene, display_options);
     if (!display) return display.error();
     if (auto ok = (*scene)->start(**display); !ok) return ok;
-    GroundProbe ground((*scene)->shared_store());
+    GroundProbe ground((*scene)->shared_store(), {});
     GLFWwindow* window = (*display)->context().window();
     glfwSetWindowTitle(window, fmt::format("Scree - {}", std::filesystem::path(o.store).filename().string()).c_str());
     const Dataset& d = (*scene)->dataset();

@@ -34,6 +34,7 @@ enum class Action {
     replay,
     profile
 };
+inline constexpr int kActions = static_cast<int>(Action::profile) + 1;
 
 struct KeyBinding {
     Action action;
@@ -44,8 +45,12 @@ struct KeyBinding {
     std::string_view does;   ///< half a sentence: "wireframe on and off"
 };
 
-/// In the order in which they are shown; one an action.
+/// In the order in which they are shown, group after group; one an action.
 std::span<const KeyBinding> key_bindings();
+/// What a key that went down means; null: nothing. Shift is held for a fast flight too, so a key that has no meaning of
+/// its own with it means what it means without.
+const KeyBinding* binding_of(int key, bool shift);
+
 /// Keys and buttons that act while they are held, for F1 and the docs: {name, does}.
 struct HeldBinding {
     std::string_view name, does;
