@@ -89,6 +89,33 @@ std::optional<std::array<double, 4>> box_of(const Json& json) {
     return box;
 }
 
+Result<GeoGrid> geo_grid_of(const Json& json) {
+    if (!json.is_object()) return store_error("dataset: 'geo_grid' is not a JSON object");
+    GeoGrid grid;
+    std::string normals;
+    Fields fields(json);
+    fields.read("columns", grid.columns);
+    fields.read("rows", grid.rows);
+    fields.read("error_m", grid.error_m);
+    fields.read("normals", normals);
+    if (!fields.problem().empty()) return store_error("dataset: geo_grid " + fields.problem());
+    const auto box = json.contains("box_m") ? box_of(json.at("box_m")) : std::nullopt;
+    if (!box) return store_error("dataset: geo_grid 'box_m' is not four finite numbers");
+    grid.box_m = *box;
+    auto decoded = normals_from_text(normals, grid.columns, grid.rows);
+    if (!decoded) return store_error("dataset: " + decoded.error().message);
+    grid.normals = std::move(*decoded);
+    return grid;
+}
+
+Json to_json(const GeoGrid& grid) {
+    return {{"columns", grid.columns},
+            {"rows", grid.rows},
+            {"box_m", grid.box_m},
+            {"error_m", grid.error_m},
+            {"normals", normals_to_text(grid)}};
+}
+
 bool is_fingerprint(const std::string& text) {
     return text.size() == 16 && text.find_first_not_of("0123456789abcdef") == std::string::npos;
 }
@@ -100,6 +127,17 @@ double Dataset::texel_m(int level) const {
 }
 
 int Dataset::deepest_level() const { return std::max(lattice.deepest_level, texture_deepest_level); }
+
+Result<void> Dataset::exaggerate(double factor) {
+    if (!(factor >= 0.01 && factor <= 100))
+        return Error{ErrorCode::usage, fmt::format("an exaggeration of {} is outside 0.01..100", factor)};
+    for (double* metres : {&height_offset_m, &height_quantum_m, &height_quantum_error_m, &warp_error_m, &min_height_m,
+                           &max_height_m, &exaggeration})
+        *metres *= factor;
+    if (auto ok = check(); !ok)
+        return Error{ErrorCode::usage, fmt::format("exaggeration {}: {}", factor, ok.error().message)};
+    return {};
+}
 
 Result<void> Dataset::check() const {
     if (auto ok = lattice.check(); !ok) return store_error("dataset: " + ok.error().message);
@@ -125,6 +163,8 @@ Result<void> Dataset::check() const {
     if (coarsest_leaf_level && (*coarsest_leaf_level < 0 || *coarsest_leaf_level >= lattice.deepest_level))
         return store_error(fmt::format("dataset: coarsest leaf level {} is not above the deepest level {}",
                                        *coarsest_leaf_level, lattice.deepest_level));
+    if (geo_grid)
+        if (auto ok = geo_grid->check(); !ok) return store_error("dataset: " + ok.error().message);
     if (height_tiles < 1 || texture_tiles < 1 || present_cells < 1)
         return store_error("dataset: a store holds at least one tile of each kind and one present cell");
     return {};
@@ -167,6 +207,7 @@ std::string dataset_to_json(const Dataset& d) {
                  {"sources", sources},
                  {"attribution", d.attribution}};
     if (d.coarsest_leaf_level) json["coarsest_leaf_level"] = *d.coarsest_leaf_level;
+    if (d.geo_grid) json["geo_grid"] = to_json(*d.geo_grid);
     if (!d.options.empty()) json["options"] = d.options;
     return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
@@ -235,6 +276,11 @@ Result<Dataset> dataset_from_json(const std::string& text) {
             if (!value.is_string()) return store_error("dataset: an option is not text");
             d.options[name] = value.get<std::string>();
         }
+    }
+    if (const auto grid = json.find("geo_grid"); grid != json.end()) {
+        auto read = geo_grid_of(*grid);
+        if (!read) return read.error();
+        d.geo_grid = std::move(*read);
     }
     if (!fields.problem().empty()) return store_error("dataset: " + fields.problem());
     if (auto ok = d.check(); !ok) return ok.error();

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "common/geo_grid.h"
 #include "common/lattice.h"
 #include "common/result.h"
 
@@ -59,6 +60,13 @@ struct Dataset {
     /// The options that it was built with, by their names on the command line: an update goes on with them.
     std::map<std::string, std::string> options;
 
+    /// Longitude and latitude; none in stores without a CRS, or made before there was one.
+    std::optional<GeoGrid> geo_grid{};
+
+    /// How many times as high as they are the heights above are given (SqliteStore's StoreOptions): what is in metres of
+    /// height here, divided by it, is what the ground has. Not of the store, and not written.
+    double exaggeration = 1;
+
     int texture_size() const { return 1 << texture_size_log2; }
     /// Metres along the side of a texel of texture level `level`.
     double texel_m(int level) const;
@@ -67,6 +75,10 @@ struct Dataset {
     /// Level of the coarsest leaf of the heights.
     int least_leaf_level() const { return coarsest_leaf_level.value_or(lattice.deepest_level); }
     double height_m(double n) const { return height_offset_m + n * height_quantum_m; }
+
+    /// Heights, their quantum and their errors times `factor`: all that is in metres of height. Errors:
+    /// ErrorCode::usage where it is not 0.01..100, or the heights would not be usable.
+    Result<void> exaggerate(double factor);
 
     Result<void> check() const;
 };

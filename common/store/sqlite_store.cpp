@@ -88,7 +88,7 @@ std::uint64_t row_checksum(int table, std::int64_t key, int codec, std::span<con
     return XXH3_64bits_withSeed(payload.data(), payload.size(), seed);
 }
 
-Result<std::unique_ptr<SqliteStore>> SqliteStore::open(const std::string& path) {
+Result<std::unique_ptr<SqliteStore>> SqliteStore::open(const std::string& path, const StoreOptions& options) {
     struct stat status {};
     if (::stat(path.c_str(), &status) != 0)
         return Error{ErrorCode::input, fmt::format("{}: {}", path, std::strerror(errno))};
@@ -99,7 +99,10 @@ Result<std::unique_ptr<SqliteStore>> SqliteStore::open(const std::string& path) 
     const auto file = identity_of(path);
     auto dataset = read_dataset(path, db->get());
     if (!dataset) return dataset.error();
-    return std::unique_ptr<SqliteStore>(new SqliteStore(path, std::move(*dataset), file));
+    if (options.exaggeration != 1)
+        if (auto ok = dataset->exaggerate(options.exaggeration); !ok)
+            return Error{ok.error().code, fmt::format("{}: {}", path, ok.error().message)};
+    return std::unique_ptr<SqliteStore>(new SqliteStore(path, options, std::move(*dataset), file));
 }
 
 SqliteStore::~SqliteStore() = default;

@@ -12,18 +12,28 @@
 
 namespace scree {
 
+/// How a store is seen.
+struct StoreOptions {
+    /// Heights so many times as high, 0.01..100: those of the Dataset handed out and all that is made of it, errors and
+    /// bounds included. Rows are as they are, for they count in quanta.
+    double exaggeration = 1;
+};
+
 /// Opens read-only. A store whose last update was cut off is brought back first, which needs the right to write it and
 /// its folder. Errors: ErrorCode::input missing or unreadable, ErrorCode::store not a store, damaged, or of another
 /// format version (both are named), ErrorCode::io.
 /// While another program commits an update, readers wait for it (a minute at most, then ErrorCode::io).
 class SqliteStore final : public TileStore {
 public:
-    static Result<std::unique_ptr<SqliteStore>> open(const std::string& path);
+    /// Errors: also ErrorCode::usage for an exaggeration that is out of range.
+    static Result<std::unique_ptr<SqliteStore>> open(const std::string& path, const StoreOptions& options = {});
     ~SqliteStore() override;
 
     const Dataset& dataset() const override { return dataset_; }
     Result<std::unique_ptr<TileReader>> open_reader() const override;
     const std::string& path() const { return path_; }
+    /// What it was opened with: opened so again it shows the same.
+    const StoreOptions& open_options() const { return options_; }
 
     struct RowView {
         std::int64_t key = 0;
@@ -56,9 +66,10 @@ private:
         bool operator==(const FileIdentity&) const = default;
     };
     static std::optional<FileIdentity> identity_of(const std::string& path);
-    SqliteStore(std::string path, Dataset dataset, std::optional<FileIdentity> file)
-        : path_(std::move(path)), dataset_(std::move(dataset)), file_(file) {}
+    SqliteStore(std::string path, const StoreOptions& options, Dataset dataset, std::optional<FileIdentity> file)
+        : path_(std::move(path)), options_(options), dataset_(std::move(dataset)), file_(file) {}
     std::string path_;
+    StoreOptions options_;
     Dataset dataset_;
     std::optional<FileIdentity> file_;
 };

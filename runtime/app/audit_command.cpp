@@ -92,7 +92,7 @@ struct Audit {
 };
 
 Result<AuditResult> audit(const ViewOptions& o, const AuditOptions& a) {
-    auto store = SqliteStore::open(o.store);
+    auto store = open_store(o);
     if (!store) return store.error();
     const Dataset& d = (*store)->dataset();
     std::optional<SourceSamples> sources;
@@ -102,6 +102,7 @@ Result<AuditResult> audit(const ViewOptions& o, const AuditOptions& a) {
         sampling.vertical_crs = d.vertical_datum;
         auto samples = sample_sources(a.against, sampling);
         if (!samples) return samples.error();
+        samples->exaggerate(d.exaggeration);
         sources = std::move(*samples);
     }
     SceneOptions options = scene_options(o);
@@ -186,7 +187,7 @@ void print(const AuditResult& r, const ViewOptions& o, const AuditOptions& a) {
 Result<bool> run_blocks(const ViewOptions& o, const AuditOptions& a) {
     for (const auto& [given, option] : {std::pair(a.moving, "--moving"), std::pair(!a.against.empty(), "--against")})
         if (auto ok = refuse_with_blocks(given, option); !ok) return ok.error();
-    auto store = SqliteStore::open(o.store);
+    auto store = open_store(o);
     if (!store) return store.error();
     auto path = flight_of(**store, o, a.frames);
     if (!path) return path.error();

@@ -117,6 +117,7 @@ std::string view_command(const ComparisonCase& c, const ViewOptions& o) {
     std::string line =
         fmt::format("scree-view view {} {} --size {}x{}", quoted(o.store), options_of(c), o.width_px, o.height_px);
     if (o.fov_deg != ViewOptions{}.fov_deg) line += fmt::format(" --fov {}", o.fov_deg);
+    if (o.exaggeration != 1) line += fmt::format(" --exaggeration {}", o.exaggeration);
     if (o.curvature_text != ViewOptions{}.curvature_text) line += fmt::format(" --curvature {}", o.curvature_text);
     return line;
 }
@@ -141,7 +142,7 @@ std::vector<ComparisonCase> cases_of(const Dataset& d, const ViewOptions& o, con
 }
 
 Result<Comparison> measure(const ViewOptions& o, const CompareOptions& c) {
-    auto store = SqliteStore::open(o.store);
+    auto store = open_store(o);
     if (!store) return store.error();
     ComparisonSetup setup;
     setup.store = std::move(*store);

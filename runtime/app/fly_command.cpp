@@ -319,7 +319,7 @@ Result<void> run_blocks(const ViewOptions& o, const FlyOptions& f, const TileSto
 }
 
 Result<void> run(const ViewOptions& o, const FlyOptions& f) {
-    auto store = SqliteStore::open(o.store);
+    auto store = open_store(o);
     if (!store) return store.error();
     if (wants_blocks(o)) return run_blocks(o, f, **store);
     SceneOptions options = scene_options(o);

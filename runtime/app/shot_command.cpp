@@ -28,7 +28,7 @@ std::optional<glm::dvec3> parse_point(const std::string& text) {
 
 Result<void> shoot(const ViewOptions& o, const std::optional<FlightPose>& asked, const std::string& out,
                    const std::string& mesh_file, const FrameSettings& debug) {
-    auto store = SqliteStore::open(o.store);
+    auto store = open_store(o);
     if (!store) return store.error();
     if (wants_blocks(o)) {
         if (auto ok = refuse_with_blocks(debug.colour_by_level, "--colour-by-level"); !ok) return ok;

@@ -255,7 +255,7 @@ double SourceLayer::stored(std::int64_t column, std::int64_t row) const {
 
 double SourceLayer::at(std::int64_t column, std::int64_t row) const {
     const double height = stored(column, row);
-    return std::isfinite(height) ? height : std::numeric_limits<double>::quiet_NaN();
+    return std::isfinite(height) ? height * exaggeration : std::numeric_limits<double>::quiet_NaN();
 }
 
 bool SourceLayer::covered(std::int64_t column, std::int64_t row) const { return !std::isnan(stored(column, row)); }

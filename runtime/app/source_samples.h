@@ -27,8 +27,8 @@ struct SourceLayer {
     std::int64_t columns = 0, rows = 0;
     std::int64_t step = 1;
 
-    /// Height in metres; NaN where the sample is no truth: a void, uncovered, or hidden by a layer above. The sample
-    /// must exist: 0 <= column < columns, 0 <= row < rows.
+    /// Height in metres, times `exaggeration`; NaN where the sample is no truth: a void, uncovered, or hidden by a
+    /// layer above. The sample must exist: 0 <= column < columns, 0 <= row < rows.
     double at(std::int64_t column, std::int64_t row) const;
     /// The sample has a height or lies under one: there is terrain.
     bool covered(std::int64_t column, std::int64_t row) const;
@@ -41,6 +41,7 @@ struct SourceLayer {
     std::int64_t control_row(std::int64_t k) const { return k + 1 < control_rows() ? k * step : rows - 1; }
     SourcePoint control(std::int64_t control_column, std::int64_t control_row) const;
 
+    double exaggeration = 1;              ///< of the store that is judged
     std::span<const std::byte> samples;   ///< columns * rows, row-major; lives as long as the SourceSamples
     std::size_t sample_bytes = 4;         ///< 4: float, 8: double
     std::span<const std::byte> controls;  ///< x and y, doubles, row-major; lives as long as the SourceSamples
@@ -61,6 +62,10 @@ public:
 
     /// Bottom to top.
     const std::vector<SourceLayer>& layers() const { return layers_; }
+    /// Their heights so many times as high.
+    void exaggerate(double factor) {
+        for (SourceLayer& layer : layers_) layer.exaggeration = factor;
+    }
 
 private:
     SourceSamples() = default;

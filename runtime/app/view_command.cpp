@@ -73,7 +73,7 @@ struct WindowSettings {
 };
 
 Result<void> view(ViewOptions o, const WindowSettings& w) {
-    auto store = SqliteStore::open(o.store);
+    auto store = open_store(o);
     if (!store) return store.error();
     if (wants_blocks(o)) return view_blocks(o, std::move(*store), {w.seconds, w.fps, w.tau_most_px});
     SceneOptions options = scene_options(o);

@@ -18,6 +18,8 @@ void add_view_options(CLI::App& app, ViewOptions& o) {
     app.add_option("--texture-tau", o.texture_tau_px,
                    "Screen pixels a texel may cover: smaller is sharper and costs memory")
         ->capture_default_str();
+    app.add_option("--exaggeration", o.exaggeration, "Heights this many times as high, and their errors with them")
+        ->capture_default_str();
     app.add_option("--budget", o.budget, "Ceiling of tile memory, such as 256M")->capture_default_str();
     app.add_option("--curvature", o.curvature_text,
                    "Lower what is far away as the earth does: auto (where it shows), on, off")
@@ -65,6 +67,8 @@ Result<void> check_view_options(ViewOptions& o) {
         return Error{ErrorCode::usage, fmt::format("--tau {} is not a length in pixels", o.tau_px)};
     if (!(std::isfinite(o.texture_tau_px) && o.texture_tau_px > 0))
         return Error{ErrorCode::usage, fmt::format("--texture-tau {} is not above 0", o.texture_tau_px)};
+    if (!(o.exaggeration >= 0.01 && o.exaggeration <= 100))
+        return Error{ErrorCode::usage, fmt::format("--exaggeration {} is outside 0.01..100", o.exaggeration)};
     const auto curvature = curvature_from(o.curvature_text);
     if (!curvature)
         return Error{ErrorCode::usage, fmt::format("--curvature {} is not auto, on or off", o.curvature_text)};
@@ -75,6 +79,10 @@ Result<void> check_view_options(ViewOptions& o) {
     if (!(o.fov_deg >= 0.001 && o.fov_deg <= 179))
         return Error{ErrorCode::usage, fmt::format("--fov {} is outside 0.001..179 degrees", o.fov_deg)};
     return {};
+}
+
+Result<std::unique_ptr<SqliteStore>> open_store(const ViewOptions& o) {
+    return SqliteStore::open(o.store, {o.exaggeration});
 }
 
 SceneOptions scene_options(const ViewOptions& o) {

@@ -1,11 +1,13 @@
 // Options that scree-view's commands share, and how they are checked.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 
 #include <CLI/CLI.hpp>
 
+#include "common/store/sqlite_store.h"
 #include "runtime/scene/scene.h"
 #include "runtime/view/camera.h"
 #include "runtime/view/flight_path.h"
@@ -18,6 +20,7 @@ struct ViewOptions {
     double fov_deg = 40;
     double tau_px = 1;
     double texture_tau_px = 1;
+    double exaggeration = 1;
     std::string budget = "256M";
     std::string curvature_text = "auto";
     bool no_morph = false;
@@ -36,6 +39,8 @@ void add_view_options(CLI::App& app, ViewOptions& options);
 void add_lod_options(CLI::App& app, LodOptions& options);
 /// Parses sizes; checks ranges. Errors: ErrorCode::usage.
 Result<void> check_view_options(ViewOptions& options);
+/// The store, its heights as high as the options want them. Errors: those of SqliteStore.
+Result<std::unique_ptr<SqliteStore>> open_store(const ViewOptions& options);
 /// The scene as the options want it.
 SceneOptions scene_options(const ViewOptions& options);
 Result<Camera> camera_of(const FlightPose& pose, const ViewOptions& options);

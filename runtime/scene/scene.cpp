@@ -129,8 +129,12 @@ Result<void> Scene::start(TileSink& sink) {
         sink_ = mesher_sink_.get();
     }
     if (auto ok = make_pager(); !ok) return ok;
-    if (options_.follow) watch_ = std::make_unique<StoreWatch>(store_, std::max(options_.loader_threads, 1));
+    begin_watch();
     return {};
+}
+
+void Scene::begin_watch() {
+    if (options_.follow) watch_ = std::make_unique<StoreWatch>(store_, std::max(options_.loader_threads, 1));
 }
 
 void Scene::tell(const std::string& message) const {
@@ -157,7 +161,7 @@ Result<void> Scene::make_pager() {
             return {};
         }
         if (!options_.follow || tries == kOpenings || !store_->has_changed()) return pager.error();
-        auto opened = SqliteStore::open(store_->path());
+        auto opened = SqliteStore::open(store_->path(), store_->open_options());
         if (!opened) return opened.error();
         if (auto ok = use_store(std::move(*opened)); !ok) return ok;
     }
@@ -173,7 +177,7 @@ Result<void> Scene::use_store(std::shared_ptr<const SqliteStore> store) {
     peak_resident_bytes_ = std::max(peak_resident_bytes_, memory_.resident_bytes);
     make_selectors();
     make_mesher();
-    return sink_->renew(dataset(), memory_);
+    return sink_ != nullptr ? sink_->renew(dataset(), memory_) : Result<void>{};
 }
 
 // Eye and path are in the coordinates of the store that was opened first.
@@ -229,9 +233,23 @@ Result<void> Scene::start_over(std::shared_ptr<const SqliteStore> store) {
     for (const TileKind kind : {TileKind::height, TileKind::texture})
         earlier_loads_[static_cast<std::size_t>(kind)] = loader_counters(kind);
     pager_.reset();  // never the memory of two
+    coming_.reset();
+    coming_selector_.reset();
     if (auto ok = use_store(std::move(store)); !ok) return ok;
     if (auto ok = make_pager(); !ok) return ok;
     ++updates_;
+    return {};
+}
+
+Result<void> Scene::set_exaggeration(double exaggeration) {
+    if (exaggeration == dataset().exaggeration) return {};
+    auto opened = SqliteStore::open(store_->path(), {exaggeration});
+    if (!opened) return opened.error();
+    if (auto ok = expect_same_place(**opened); !ok) return ok;
+    if (!pager_) return use_store(std::move(*opened));
+    watch_.reset();  // what it may have opened is of the old heights
+    if (auto ok = start_over(std::move(*opened)); !ok) return ok;
+    begin_watch();
     return {};
 }
 

@@ -87,6 +87,11 @@ public:
     /// what is drawn, and drawn once it is as complete. Waits for nothing, unless memory must be divided anew, which
     /// costs a frame. Errors: ErrorCode::store where another store has taken the place of this one; those of start().
     Result<void> follow();
+    /// Heights so many times as high as they are, 0.01..100, from now on: the store is opened again, and drawing starts
+    /// over as it does after an update for which memory is divided anew: roots at once, what is finer as it comes.
+    /// Counts among updates(). The eye stays where it is. Errors: ErrorCode::usage out of range, those of SqliteStore
+    /// (then nothing has changed), those of start().
+    Result<void> set_exaggeration(double exaggeration);
     /// One frame's arrivals, selection and requests at `now_s`, a clock that only has to move forward. While tiles are
     /// missing it may look again for `patience_s`: what is a small part of a long frame fills the gaps of the picture.
     /// The selection is valid until the next call.
@@ -109,6 +114,7 @@ private:
     static Result<MemoryPlan> plan_of(const Dataset& dataset, const SceneOptions& options);
     void forget_selections();
     void tell(const std::string& message) const;
+    void begin_watch();
     Result<void> make_pager();
     Result<void> use_store(std::shared_ptr<const SqliteStore> store);
     Result<void> expect_same_place(const SqliteStore& next) const;

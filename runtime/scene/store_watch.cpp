@@ -10,8 +10,8 @@ constexpr std::chrono::milliseconds kLook{250};
 
 }  // namespace
 
-Result<OpenedStore> open_store(const std::string& path, int readers) {
-    auto store = SqliteStore::open(path);
+Result<OpenedStore> open_store(const std::string& path, const StoreOptions& options, int readers) {
+    auto store = SqliteStore::open(path, options);
     if (!store) return store.error();
     OpenedStore opened{std::move(*store), {}};
     for (int k = 0; k < readers; ++k) {
@@ -55,7 +55,7 @@ void StoreWatch::run() {
 
 void StoreWatch::look() {
     if (!latest_->has_changed()) return;
-    auto opened = open_store(latest_->path(), readers_);
+    auto opened = open_store(latest_->path(), latest_->open_options(), readers_);
     // Changed again meanwhile: the readers may see more than the store says. Next time, then.
     if (opened && opened->store->has_changed()) return;
     std::optional<OpenedStore> old;  // closed after the lock is gone

@@ -22,12 +22,12 @@ struct OpenedStore {
 
 /// Opens the store under `path` with so many readers. Waits while another program commits. Errors: those of
 /// SqliteStore.
-Result<OpenedStore> open_store(const std::string& path, int readers);
+Result<OpenedStore> open_store(const std::string& path, const StoreOptions& options, int readers);
 
 /// take() is for one thread, and never waits.
 class StoreWatch {
 public:
-    /// Looks four times a second whether `store` has changed.
+    /// Looks four times a second whether `store` has changed. What comes is opened with the same options.
     StoreWatch(std::shared_ptr<const SqliteStore> store, int readers);
     ~StoreWatch();
     StoreWatch(const StoreWatch&) = delete;

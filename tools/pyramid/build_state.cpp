@@ -78,8 +78,9 @@ std::string identity_of(const Dataset& dataset) {
     const Json all = Json::parse(dataset_to_json(dataset));
     // What only the finished store knows.
     static const std::set<std::string> made = {
-        "height_tiles", "texture_tiles", "present_cells",          "height_offset_m", "height_quantum_m",
-        "min_height_m", "max_height_m",  "height_quantum_error_m", "warp_error_m",    "coarsest_leaf_level"};
+        "height_tiles",     "texture_tiles",       "present_cells", "height_offset_m",
+        "height_quantum_m", "min_height_m",        "max_height_m",  "height_quantum_error_m",
+        "warp_error_m",     "coarsest_leaf_level", "geo_grid"};
     Json json = {{"build_version", kBuildVersion}};
     for (const auto& [name, value] : all.items())
         if (made.count(name) == 0) json[name] = value;

@@ -22,6 +22,7 @@
 #include "tools/pyramid/build_state.h"
 #include "tools/pyramid/height_stage.h"
 #include "tools/pyramid/texture_stage.h"
+#include "tools/source/geo_grid_maker.h"
 #include "tools/source/isolated_decoder.h"
 #include "tools/stage_clock.h"
 
@@ -184,6 +185,7 @@ private:
         Dataset& d = state_.dataset;
         d.texture_tiles = 0;
         if (auto ok = store_->for_each_key(TileKind::texture, [&](std::int64_t) { ++d.texture_tiles; }); !ok) return ok;
+        d.geo_grid = make_geo_grid(d.lattice, d.crs);
         if (auto ok = store_->finish(d); !ok) return ok;
         if (stop_) return Error{ErrorCode::interrupted, "stopped"};
         writer_.reset();

@@ -23,6 +23,7 @@
 #include "tools/pyramid/height_stage.h"
 #include "tools/pyramid/texture_stage.h"
 #include "tools/source/fingerprint.h"
+#include "tools/source/geo_grid_maker.h"
 #include "tools/source/isolated_decoder.h"
 #include "tools/source/source_list.h"
 
@@ -425,6 +426,7 @@ private:
             if (auto ok = apply(**target, kind); !ok) return ok;
         if (auto ok = count(**target, TileKind::height, dataset_.height_tiles); !ok) return ok;
         if (auto ok = count(**target, TileKind::texture, dataset_.texture_tiles); !ok) return ok;
+        dataset_.geo_grid = make_geo_grid(dataset_.lattice, dataset_.crs);
         if (auto ok = (*target)->finish(dataset_); !ok) return ok;
         writer_.reset();
         return {};
