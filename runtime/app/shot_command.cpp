@@ -31,7 +31,7 @@ Result<void> shoot(const ViewOptions& o, const std::optional<FlightPose>& asked,
     auto store = open_store(o);
     if (!store) return store.error();
     if (wants_blocks(o)) {
-        if (auto ok = refuse_with_blocks(debug.colour_by_level, "--colour-by-level"); !ok) return ok;
+        if (auto ok = refuse_with_blocks(debug.highlight != Highlight::none, "--colour"); !ok) return ok;
         return shoot_blocks(o, **store, {asked, out, mesh_file, debug});
     }
     SceneOptions options = scene_options(o);
@@ -43,7 +43,8 @@ Result<void> shoot(const ViewOptions& o, const std::optional<FlightPose>& asked,
     auto display = Display::create(**scene, display_options);
     if (!display) return display.error();
     (*display)->frame_settings().wireframe = debug.wireframe;
-    (*display)->frame_settings().colour_by_level = debug.colour_by_level;
+    (*display)->frame_settings().highlight = debug.highlight;
+    (*display)->frame_settings().highlight_full_px = o.tau_px > 0 ? o.tau_px : 1;
     (*display)->frame_settings().magenta_background = debug.magenta_background;
     if (auto ok = (*scene)->start(**display); !ok) return ok;
     const FlightPose pose =
@@ -83,7 +84,7 @@ Result<void> shoot(const ViewOptions& o, const std::optional<FlightPose>& asked,
 int run_shot(int argc, char** argv) {
     CLI::App app{"Draws one picture, complete, without a window.", "scree-view shot"};
     ViewOptions o;
-    std::string out, mesh, eye, look;
+    std::string out, mesh, eye, look, colour;
     FrameSettings debug;
     add_view_options(app, o);
     app.add_option("-o,--output", out, "The PNG to write")->required()->type_name("FILE");
@@ -93,10 +94,14 @@ int run_shot(int argc, char** argv) {
     app.add_option("--mesh", mesh, "Also write the drawn triangles as a binary PLY in the dataset's coordinates")
         ->type_name("FILE");
     app.add_flag("--wireframe", debug.wireframe, "Draw edges only");
-    app.add_flag("--colour-by-level", debug.colour_by_level, "Tint each tile by its level");
+    app.add_option("--colour", colour,
+                   "Tint each tile by its level, its geomip level, or its error as a share of --tau")
+        ->type_name("level|geomip|error")
+        ->check(CLI::IsMember({"level", "geomip", "error"}));
     app.add_flag("--magenta", debug.magenta_background, "No sky: what is not terrain is pure magenta");
     if (const int code = parse_arguments(app, argc, argv); code >= 0) return code;
     if (auto ok = check_view_options(o); !ok) return report_error("scree-view shot", ok.error());
+    debug.highlight = highlight_from(colour).value_or(Highlight::none);
     std::optional<FlightPose> pose;
     if (!eye.empty()) {
         const auto e = parse_point(eye), l = parse_point(look);

@@ -129,7 +129,9 @@ Result<void> view(ViewOptions o, const WindowSettings& w) {
             redraw = redraw || presses > 0;
         };
         toggle(GLFW_KEY_F, settings.wireframe);
-        toggle(GLFW_KEY_L, settings.colour_by_level);
+        bool by_level = settings.highlight == Highlight::level;
+        toggle(GLFW_KEY_L, by_level);
+        settings.highlight = by_level ? Highlight::level : Highlight::none;
         toggle(GLFW_KEY_H, show_hud);
         toggle(GLFW_KEY_V, second_view);
         const int steps = controls.take_presses(GLFW_KEY_LEFT_BRACKET) - controls.take_presses(GLFW_KEY_RIGHT_BRACKET);

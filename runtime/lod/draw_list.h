@@ -60,6 +60,10 @@ struct DrawItem {
     /// Slots of the eight textures round `texture` on its own level, -1 where there is none; all -1 unless
     /// `texture` may be magnified here. The renderer filters across their common borders.
     std::array<std::int32_t, 8> neighbour_textures{-1, -1, -1, -1, -1, -1, -1, -1};
+
+    /// Pixels that the surface drawn here may be off the finest one, in any view: this tile's share of
+    /// Selection::max_bound_px.
+    float bound_px = 0;
 };
 
 using DrawList = std::vector<DrawItem>;

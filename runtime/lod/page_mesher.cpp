@@ -329,11 +329,18 @@ struct PageMesher::Impl {
         return state.made && state.drawn == edges.tiles()[t].border && pool.holds(state.mesh);
     }
 
-    void hand_over(Selection& selection) {
+    void hand_over(Selection& selection, double promise_px) {
+        const auto least_px = static_cast<float>(promise_px);
         for (DrawList& list : selection.draws)
-            for (DrawItem& item : list) item.mesh = mesh_of(item);
+            for (DrawItem& item : list) {
+                item.mesh = mesh_of(item);
+                item.bound_px = std::max(item.bound_px, least_px);
+            }
         for (DrawList& list : selection.parts)
-            for (DrawItem& item : list) item.mesh = part_of(item);
+            for (DrawItem& item : list) {
+                item.mesh = part_of(item);
+                item.bound_px = std::max(item.bound_px, least_px);
+            }
         selection.triangles = 0;
         for (const Drawn& tile : tiles) selection.triangles += tile.views * triangles_of(tile);
         counters.triangles = selection.triangles;
@@ -386,10 +393,11 @@ struct PageMesher::Impl {
             return;
         }
         selection.budget_limited = selection.budget_limited || s.tau_px > asked_px;
-        hand_over(selection);
+        const double promise_px = lod.promise_px(s.tau_px);
+        hand_over(selection, promise_px);
         selection.tau_effective_px = s.tau_px;
-        selection.max_bound_px = std::max(selection.max_bound_px, lod.promise_px(s.tau_px));
-        selection.mean_bound_px = std::max(selection.mean_bound_px, lod.promise_px(s.tau_px));
+        selection.max_bound_px = std::max(selection.max_bound_px, promise_px);
+        selection.mean_bound_px = std::max(selection.mean_bound_px, promise_px);
     }
 
     bool choose_and_make(std::span<const Camera> views, const MeshSettings& s) {

@@ -179,6 +179,7 @@ struct Selector::Impl {
             textures.place(cut, static_cast<std::int32_t>(k), settings.growth_s, item);
             ++result.nodes;
             const double bound_px = cut.drawn_error_m(node, drawn) / cut.certain_metres_per_px(node);
+            item.bound_px = static_cast<float>(bound_px);
             result.max_bound_px = std::max(result.max_bound_px, bound_px);
             const double weight = screen_share(node);
             result.mean_bound_px += weight * bound_px;

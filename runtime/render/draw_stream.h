@@ -24,7 +24,8 @@ struct DrawCommand {
 };
 static_assert(sizeof(DrawCommand) == 20);
 
-/// The attributes that every draw has, kTileAttribute to kEdgeMorphAttribute (shaders/shared_constants.glsl).
+/// The attributes that every draw has, kTileAttribute to kEdgeMorphAttribute and kHighlightAttribute
+/// (shaders/shared_constants.glsl).
 struct DrawAttributes {
     std::int32_t lattice_i = 0, lattice_j = 0;  ///< the tile's north-west corner, finest cells
     std::int32_t step = 1;                      ///< finest cells from one sample to the next
@@ -37,8 +38,9 @@ struct DrawAttributes {
     std::uint32_t edge_mask = 0;
     float morph = 0;
     std::array<float, 4> edge_morph{};
+    std::array<std::uint8_t, 4> highlight{};  ///< sRGB; of highlighted frames
 };
-static_assert(sizeof(DrawAttributes) == 60);
+static_assert(sizeof(DrawAttributes) == 64);
 
 /// A texture that a blended draw looks at: unit << kTextureLayerBits | layer, or kNoTexture.
 using TextureCode = std::uint16_t;

@@ -9,6 +9,7 @@ namespace scree {
 namespace {
 
 constexpr const char* kVersion = "#version 450 core\n";
+constexpr const char* kHighlightDefine = "#define SCREE_HIGHLIGHT\n";
 
 Result<void> attach(GLuint program, GLenum stage, const std::vector<std::string>& strings, const std::string& name) {
     const ShaderHandle shader(glCreateShader(stage));
@@ -60,15 +61,17 @@ Result<ProgramHandle> build_program(const ProgramSources& sources) {
     return program;
 }
 
-std::vector<std::string> terrain_vertex_sources(int tile_cells_log2, Imagery imagery) {
+std::vector<std::string> terrain_vertex_sources(int tile_cells_log2, Imagery imagery, bool highlight) {
     using namespace shader_source;
     // A constant, so that the compiler turns the division by it into a multiplication.
     return {imagery == Imagery::plain ? "" : "#define SCREE_BLENDED\n",
+            highlight ? kHighlightDefine : "",
             std::string(shared_constants),
             fmt::format("const int kTileSamples = {};\n", (1 << tile_cells_log2) + 1),
             std::string(terrain_position),
             std::string(terrain_morph),
             std::string(atmosphere),
+            std::string(srgb),
             std::string(terrain_vert)};
 }
 
@@ -76,9 +79,9 @@ std::vector<std::string> terrain_fragment_sources(const TerrainVariant& variant)
     using namespace shader_source;
     const bool fading = variant.imagery == Imagery::blended || variant.imagery == Imagery::blended_of_all;
     const int arrays = variant.imagery == Imagery::blended_of_all ? variant.all_arrays : fading ? 2 : 1;
-    return {std::string(shared_constants),
+    return {variant.highlight ? kHighlightDefine : "",
+            std::string(shared_constants),
             with_bool("kWithHaze", variant.with_haze),
-            with_bool("kColourByLevel", variant.colour_by_level),
             with_bool("kFading", fading),
             fmt::format("const int kArrays = {};\nconst float kTextureTexels = {}.0;\n", arrays,
                         1 << variant.texture_size_log2),
@@ -91,7 +94,7 @@ std::vector<std::string> terrain_fragment_sources(const TerrainVariant& variant)
 
 Result<ProgramHandle> build_terrain_program(const TerrainVariant& variant) {
     return build_program({"terrain",
-                          terrain_vertex_sources(variant.tile_cells_log2, variant.imagery),
+                          terrain_vertex_sources(variant.tile_cells_log2, variant.imagery, variant.highlight),
                           terrain_fragment_sources(variant),
                           {}});
 }
@@ -103,6 +106,14 @@ Result<ProgramHandle> build_surface_program(bool with_haze) {
                            std::string(surface_vert)},
                           {std::string(shared_constants), with_bool("kWithHaze", with_haze), std::string(atmosphere),
                            std::string(surface_frag)},
+                          {}});
+}
+
+Result<ProgramHandle> build_line_program() {
+    using namespace shader_source;
+    return build_program({"line",
+                          {std::string(shared_constants), std::string(srgb), std::string(line_vert)},
+                          {std::string(shared_constants), std::string(line_frag)},
                           {}});
 }
 

@@ -19,16 +19,18 @@ struct TerrainVariant {
     Imagery imagery = Imagery::plain;
     int all_arrays = 1;  ///< that Imagery::blended_of_all has bound
     bool with_haze = false;
-    bool colour_by_level = false;
+    bool highlight = false;
 };
 
 Result<ProgramHandle> build_terrain_program(const TerrainVariant& variant);
 /// Of SurfaceRenderer.
 Result<ProgramHandle> build_surface_program(bool with_haze);
 Result<ProgramHandle> build_sky_program();
+/// Of LineRenderer.
+Result<ProgramHandle> build_line_program();
 
 /// The strings that make the terrain's vertex shader, in order.
-std::vector<std::string> terrain_vertex_sources(int tile_cells_log2, Imagery imagery);
+std::vector<std::string> terrain_vertex_sources(int tile_cells_log2, Imagery imagery, bool highlight = false);
 
 struct ProgramSources {
     std::string name;                           ///< for messages

@@ -46,6 +46,11 @@ public:
     void integers(int location, GLuint binding, GLint count, GLenum type, std::size_t offset) const {
         glVertexArrayAttribIFormat(vertex_array_, enabled(location, binding), count, type, static_cast<GLuint>(offset));
     }
+    /// 0..255 as 0..1.
+    void bytes(int location, GLuint binding, GLint count, std::size_t offset) const {
+        glVertexArrayAttribFormat(vertex_array_, enabled(location, binding), count, GL_UNSIGNED_BYTE, GL_TRUE,
+                                  static_cast<GLuint>(offset));
+    }
 
 private:
     GLuint enabled(int location, GLuint binding) const {
@@ -67,6 +72,7 @@ VertexArrayHandle make_vertex_array(const VertexArena& vertices, const IndexAren
     formats.integers(shader::kPatternAttribute, kDrawBinding, 2, GL_INT, offsetof(DrawAttributes, stride));
     formats.floats(shader::kMorphAttribute, kDrawBinding, 1, offsetof(DrawAttributes, morph));
     formats.floats(shader::kEdgeMorphAttribute, kDrawBinding, 4, offsetof(DrawAttributes, edge_morph));
+    formats.bytes(shader::kHighlightAttribute, kDrawBinding, 4, offsetof(DrawAttributes, highlight));
     if (blended) {
         formats.floats(shader::kCoarseAttribute, kBlendBinding, 4, offsetof(BlendAttributes, coarse_scale));
         formats.integers(shader::kCodesAttribute, kBlendBinding, 2, GL_UNSIGNED_INT, offsetof(BlendAttributes, own));
@@ -81,7 +87,21 @@ VertexArrayHandle make_vertex_array(const VertexArena& vertices, const IndexAren
 }
 
 std::size_t look_of(const FrameSettings& settings) {
-    return (settings.haze_distance_m > 0 ? 1u : 0u) + (settings.colour_by_level ? 2u : 0u);
+    return (settings.haze_distance_m > 0 ? 1u : 0u) + (settings.highlight != Highlight::none ? 2u : 0u);
+}
+
+std::array<std::uint8_t, 4> highlight_of(const DrawItem& item, const FrameSettings& settings) {
+    switch (settings.highlight) {
+        case Highlight::none:
+            break;
+        case Highlight::level:
+            return highlight_colour(Highlight::level, item.tile.level);
+        case Highlight::geomip:
+            return highlight_colour(Highlight::geomip, item.geomip);
+        case Highlight::error:
+            return highlight_colour(Highlight::error, static_cast<double>(item.bound_px) / settings.highlight_full_px);
+    }
+    return {};
 }
 
 }  // namespace
@@ -101,14 +121,15 @@ struct Renderer::State {
     DrawStream stream;
     VertexArrayHandle plain_array, blended_array;
     SkyPass sky;
-    std::array<std::array<ProgramHandle, 4>, kImageryKinds> terrain;  ///< [imagery][haze + 2 * colour by level]
+    std::array<std::array<ProgramHandle, 4>, kImageryKinds> terrain;  ///< [imagery][haze + 2 * highlight]
 
     int bound_arrays = 1;  ///< by Imagery::blended_of_all
 
     Result<void> build_programs();
     /// Sorts the draws into batches and writes them to the region; returns their triangles.
-    std::uint64_t write_draws(std::span<const DrawItem> items, const DrawStream::Region& region);
-    DrawAttributes attributes_of(const DrawItem& item) const;
+    std::uint64_t write_draws(std::span<const DrawItem> items, const FrameSettings& settings,
+                              const DrawStream::Region& region);
+    DrawAttributes attributes_of(const DrawItem& item, const FrameSettings& settings) const;
     BlendAttributes blend_of(const DrawItem& item, const DrawBatch& batch) const;
     /// kNoTexture for what is in no array that the batch has bound.
     TextureCode texture_code(std::int32_t slot, const DrawBatch& batch, bool coarse = false) const;
@@ -131,7 +152,7 @@ Result<void> Renderer::State::build_programs() {
     return {};
 }
 
-DrawAttributes Renderer::State::attributes_of(const DrawItem& item) const {
+DrawAttributes Renderer::State::attributes_of(const DrawItem& item, const FrameSettings& settings) const {
     assert(options.lattice.contains(item.tile) && item.tile.level <= options.lattice.deepest_level);
     assert(item.height_slot >= 0 && item.height_slot < vertices.slots());
     assert(item.edge_mask < kEdgeMaskCount);
@@ -147,7 +168,8 @@ DrawAttributes Renderer::State::attributes_of(const DrawItem& item) const {
             1 << item.geomip,
             item.edge_mask,
             item.morph,
-            item.edge_morph};
+            item.edge_morph,
+            highlight_of(item, settings)};
 }
 
 TextureCode Renderer::State::texture_code(std::int32_t slot, const DrawBatch& batch, bool coarse) const {
@@ -178,7 +200,8 @@ BlendAttributes Renderer::State::blend_of(const DrawItem& item, const DrawBatch&
     return blend;
 }
 
-std::uint64_t Renderer::State::write_draws(std::span<const DrawItem> items, const DrawStream::Region& region) {
+std::uint64_t Renderer::State::write_draws(std::span<const DrawItem> items, const FrameSettings& settings,
+                                           const DrawStream::Region& region) {
     batches.sort(items);
     std::uint64_t triangles = 0;
     for (std::size_t draw = 0; draw < batches.draws().size(); ++draw) {
@@ -186,7 +209,7 @@ std::uint64_t Renderer::State::write_draws(std::span<const DrawItem> items, cons
         const DrawItem& item = items[sorted.item];
         const DrawBatch& batch = batches.batches()[sorted.batch];
         const IndexRange range = indices.range(item, sorted.shape);
-        region.attributes[draw] = attributes_of(item);
+        region.attributes[draw] = attributes_of(item, settings);
         region.commands[draw] = {range.count, 1, range.first, item.height_slot * vertices.slot_vertices(),
                                  static_cast<std::uint32_t>(draw)};
         if (batch.imagery != Imagery::plain) region.blends[draw] = blend_of(item, batch);
@@ -302,7 +325,7 @@ FrameTimes Renderer::draw(const Camera& camera, std::span<const DrawItem> items,
     items = items.first(std::min(items.size(), static_cast<std::size_t>(state_->options.max_draws)));
 
     const DrawStream::Region region = state_->stream.begin_frame();
-    times.triangles = state_->write_draws(items, region);
+    times.triangles = state_->write_draws(items, settings, region);
     times.draws = static_cast<std::uint32_t>(state_->batches.draws().size());
 
     begin_picture(target);

@@ -14,6 +14,7 @@
 #include "common/mesh/vertex_slot.h"
 #include "common/result.h"
 #include "runtime/lod/draw_list.h"
+#include "runtime/render/highlight.h"
 #include "runtime/render/render_target.h"
 #include "runtime/render/texture_arena.h"
 #include "runtime/view/camera.h"
@@ -31,7 +32,7 @@ struct RendererOptions {
     int texture_slots = 1;
     /// Capacity of the frames' MeshPool, 0 without one: mesh_arena_bytes() says what it takes.
     std::size_t mesh_indices = 0;
-    /// Items a frame at most. Each may be two draws, of 120 bytes each, three times.
+    /// Items a frame at most. Each may be two draws, of 124 bytes each, three times.
     int max_draws = 4096;
     /// 1: off; up to 16: sharper imagery at grazing angles; costs 5 to 6 ms at 800x800 on software OpenGL.
     double anisotropy = 1;
@@ -56,7 +57,8 @@ struct FrameSettings {
     double half_curvature = 0;
     /// For finding faults.
     bool wireframe = false;
-    bool colour_by_level = false;
+    Highlight highlight = Highlight::none;
+    double highlight_full_px = 1;     ///< Highlight::error: DrawItem::bound_px of the ramp's far end
     bool magenta_background = false;  ///< pure (255, 0, 255) in place of the sky: what shows it was not drawn on
     /// Wait for the end of drawing and fill FrameTimes::finished_ms. Stops CPU and GPU from overlapping.
     bool wait_until_drawn = false;

@@ -13,11 +13,14 @@ extern const std::string_view imagery_plain;
 extern const std::string_view imagery_faded;
 extern const std::string_view imagery_blended;
 extern const std::string_view atmosphere;
+extern const std::string_view srgb;
 extern const std::string_view terrain_vert;
 extern const std::string_view terrain_frag;
 extern const std::string_view surface_vert;
 extern const std::string_view surface_frag;
 extern const std::string_view sky_vert;
 extern const std::string_view sky_frag;
+extern const std::string_view line_vert;
+extern const std::string_view line_frag;
 
 }  // namespace scree::shader_source

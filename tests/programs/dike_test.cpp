@@ -174,7 +174,7 @@ TEST_F(Dikes, WhatTheyCannotShowIsRefused) {
         expect_refused(run(command, {"--curvature", "on"}), {"--curvature on", "--cracks dike", "flat"});
         expect_refused(run(command, {"--budget", "1M"}), {"235 x 168", "--budget", "1 MiB"});
     }
-    expect_refused(run({"shot", "-o", png, "--colour-by-level"}), {"--colour-by-level", "--cracks dike"});
+    expect_refused(run({"shot", "-o", png, "--colour", "level"}), {"--colour", "--cracks dike"});
     expect_refused(run({"audit", "--moving"}), {"--moving", "--cracks dike"});
     for (const char* option : {"--settled", "--see-through"})
         expect_refused(run({"fly", "--headless", option}), {option, "--cracks dike"});

@@ -1,22 +1,25 @@
-// Imagery (imagery_texel(), of one of three files), then haze. kWithHaze and kColourByLevel are set when the program is
-// built.
+// Imagery (imagery_texel(), of one of three files), then haze. kWithHaze, and SCREE_HIGHLIGHT for tiles that are
+// coloured, are set when the program is built.
 in vec3 relative_m;
 in float haze_density;
-flat in int tile_step;
 
 out vec4 fragment_colour;
 
-vec3 level_colour() {
-    float level = float(findMSB(tile_step));
-    return 0.5 + 0.5 * cos(2.4 * level + vec3(0.0, 2.1, 4.2));
-}
+#ifdef SCREE_HIGHLIGHT
+flat in vec3 highlight;
+
+// The imagery in grey, so that only the tile's colour has a hue.
+vec3 highlighted(vec3 colour) { return mix(vec3(dot(colour, vec3(0.2126, 0.7152, 0.0722))), highlight, 0.65); }
+#else
+vec3 highlighted(vec3 colour) { return colour; }
+#endif
 
 void main() {
     vec4 texel = imagery_texel();
     // Alpha 0 means "no heights here". Such texels decode to black, so filtering premultiplies: divide by what is there.
     if (texel.a < 0.5) discard;
     vec3 colour = texel.rgb / texel.a;
-    if (kColourByLevel) colour = mix(colour, level_colour(), 0.6);
+    colour = highlighted(colour);
     if (kWithHaze) colour = hazy(colour, relative_m, haze_density);
     fragment_colour = vec4(colour, 1.0);
 }

@@ -1,5 +1,5 @@
-// One tile vertex. kTileSamples (m + 1), and SCREE_BLENDED for draws that look at several textures, are set when the
-// program is built.
+// One tile vertex. kTileSamples (m + 1), SCREE_BLENDED for draws that look at several textures, and SCREE_HIGHLIGHT for
+// frames whose tiles are coloured, are set when the program is built.
 layout(location = kHeightAttribute) in vec3 heights_n;
 layout(location = kTileAttribute) in ivec4 tile;
 layout(location = kTextureAttribute) in vec4 placement;
@@ -12,7 +12,11 @@ invariant gl_Position;
 out vec3 relative_m;
 out float haze_density;  // mean over the ray; so nearly linear over a triangle that it need not be worked out per pixel
 out vec2 texture_position;
-flat out int tile_step;
+
+#ifdef SCREE_HIGHLIGHT
+layout(location = kHighlightAttribute) in vec4 highlight_srgb;
+flat out vec3 highlight;
+#endif
 
 #ifndef SCREE_BLENDED
 flat out float texture_layer;
@@ -37,7 +41,9 @@ void main() {
     haze_density = mean_haze_density(flat_m.z);  // air follows the curve of the ground
     vec2 tile_position = vec2(sample_index) / float(kTileCells);
     texture_position = placement.zw + placement.y * tile_position;
-    tile_step = tile.z;
+#ifdef SCREE_HIGHLIGHT
+    highlight = linear_of(highlight_srgb.rgb);
+#endif
 #ifndef SCREE_BLENDED
     texture_layer = placement.x;
 #else

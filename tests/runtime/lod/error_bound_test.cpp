@@ -50,6 +50,7 @@ TEST(ErrorBound, WithEverythingResidentEveryLeafMeetsTheToleranceAtItsBox) {
                     held = std::max(held, px);
                 else
                     ASSERT_LE(px, tau * (1 + 1e-12));
+                ASSERT_NEAR(item.bound_px, px, 1e-6 * px);
                 worst = std::max(worst, px);
                 coarse += px > 0 ? 1 : 0;
                 ++leaves;

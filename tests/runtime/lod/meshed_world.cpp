@@ -62,6 +62,11 @@ std::string MeshedWorld::fault(const Camera& camera, std::size_t view, double ta
     if ((s.budget_limited && !pool_is_short_) || !s.complete) return "limited or not complete";
     if (!s.budget_limited && s.max_bound_px > promise_px * (1 + 1e-12))
         return fmt::format("a bound of {} px is stated", s.max_bound_px);
+    float worst_item_px = 0;
+    for (const DrawList& list : s.draws)
+        for (const DrawItem& item : list) worst_item_px = std::max(worst_item_px, item.bound_px);
+    if (!s.draws.empty() && s.nodes > 0 && worst_item_px != static_cast<float>(s.max_bound_px))
+        return fmt::format("tiles are {} px off, all together {} px", worst_item_px, s.max_bound_px);
     for (const DrawItem& item : s.draws[view])
         for (const float weight :
              {item.morph, item.edge_morph[0], item.edge_morph[1], item.edge_morph[2], item.edge_morph[3]})

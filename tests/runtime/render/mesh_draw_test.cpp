@@ -166,7 +166,7 @@ TEST_F(MeshDrawTest, AMeshOfAPatternsTrianglesIsThePatternsPicture) {
         for (const bool by_level : {false, true})
             for (int geomip = 0; geomip < 4; ++geomip) {
                 settings_.wireframe = wires;
-                settings_.colour_by_level = by_level;
+                settings_.highlight = by_level ? Highlight::level : Highlight::none;
                 settings_.half_curvature = geomip % 2 == 0 ? 0 : 1e-4;
                 DrawItem item;
                 item.geomip = geomip;

@@ -451,14 +451,41 @@ TEST_F(RendererTest, DebugViewsDrawWhatTheySay) {
     const Picture wires = draw(from_above(200), {DrawItem{}}, settings);
     EXPECT_GT(wires.count(kGreen), 0);
     EXPECT_GT(wires.count(kMagenta), wires.count(kGreen));
+}
 
-    settings = bare();
-    settings.colour_by_level = true;
-    DrawItem coarse, fine;
-    fine.tile = {1, 0, 0};
-    const Rgb coarse_colour = draw(from_above(386), {coarse}, settings).at(kNear, kNear);
-    const Rgb fine_colour = draw(from_above(386), {fine}, settings).at(kNear, kNear);
-    EXPECT_NE(coarse_colour, fine_colour);
+// A highlighted tile is its colour of highlight_colour at 0.65, over its imagery in grey: here black or white.
+TEST_F(RendererTest, HighlightsTellLevelGeomipAndError) {
+    make_small();
+    renderer_->upload_texture(0, plain_texture(kTextureLog2, 0));
+    renderer_->upload_texture(1, plain_texture(kTextureLog2, kWhite565));
+    const auto light_of = [](double srgb) {
+        const double c = srgb / 255;
+        return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
+    };
+    DrawItem item;
+    item.tile = {2, 1, 1};
+    item.geomip = 1;
+    item.bound_px = 0.6f;
+    FrameSettings settings = bare();
+    settings.highlight_full_px = 2;
+    struct Case {
+        Highlight highlight;
+        double value;
+    };
+    for (const Case& c : {Case{Highlight::level, 2}, Case{Highlight::geomip, 1}, Case{Highlight::error, 0.3}})
+        for (const int texture : {0, 1})
+            for (const std::int32_t neighbour : {-1, 0})  // by either program
+                for (const double haze_m : {0.0, 1e9}) {
+                    item.texture.slot = texture;
+                    item.neighbour_textures[0] = neighbour;
+                    settings.highlight = c.highlight;
+                    settings.haze_distance_m = haze_m;
+                    const Rgb seen = draw(from_above(386), {item}, settings).at(35, 35);
+                    const auto expected = highlight_colour(c.highlight, c.value);
+                    for (std::size_t k = 0; k < 3; ++k)
+                        EXPECT_NEAR(light_of(seen[k]), 0.65 * light_of(expected[k]) + 0.35 * texture, 0.01)
+                            << "highlight " << static_cast<int>(c.highlight) << ", texture " << texture;
+                }
 }
 
 TEST_F(RendererTest, ManyFramesInFlightDoNotMixTheirDraws) {
