@@ -54,9 +54,8 @@ Error sqlite_error(const std::string& path, sqlite3* db, int rc) {
         case SQLITE_NOTADB:
             return {ErrorCode::store, fmt::format("{}: not a Scree store ({})", path, reason)};
         case SQLITE_CORRUPT:
-            return {ErrorCode::store, fmt::format("{}: damaged or cut short ({}); copy it anew or build it again: "
-                                                  "`scree verify` names what is still sound",
-                                                  path, reason)};
+            return {ErrorCode::store,
+                    fmt::format("{}: damaged or cut short ({}); copy it anew or build it again", path, reason)};
         case SQLITE_FULL:
             return {ErrorCode::io, fmt::format("{}: no space left on its disk ({})", path, reason)};
         default:
