@@ -346,6 +346,21 @@ TEST(CameraRig, GlidesToAPointWithinASecondAndNearerByHalf) {
     }
 }
 
+TEST(CameraRig, AGlideTurnsTheShorterWay) {
+    for (double heading = -4; heading < 4; heading += 0.1) {
+        const glm::dvec3 view{std::cos(heading), std::sin(heading), -0.1};
+        const glm::dvec3 point = 500.0 * glm::dvec3(std::cos(heading + 0.5), std::sin(heading + 0.5), -0.1);
+        CameraRig rig({{0, 0, 0}, view}, kExtent_m);
+        rig.focus(point);
+        do {
+            const glm::dvec3 before = direction(rig.pose());
+            rig.move(frame(), std::nullopt);
+            EXPECT_LT(angle(before, direction(rig.pose())), 0.02) << heading;
+        } while (rig.gliding());
+        EXPECT_LT(angle(direction(rig.pose()), point), 1e-8);
+    }
+}
+
 TEST(CameraRig, AGlideLooksAtItsPointAlsoWhereTheGroundLiftsIt) {
     CameraRig rig(home(), kExtent_m);
     const glm::dvec3 point = home().eye + glm::dvec3(1000, 1000, -900);

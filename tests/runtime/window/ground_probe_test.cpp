@@ -180,48 +180,67 @@ TEST_F(Probe, ANewerQuestionTakesThePlaceOfOneThatWaits) {
     EXPECT_EQ(answers_.count(), 2) << "the first and the last";
 }
 
-// Whoever moves asks for heights all the time: a new one is there whenever one is answered.
+/// Asks for another height whenever an answer comes, as whoever moves does, until all else is answered; notes after
+/// how many answers that was. On the probe's thread alone, but for what is atomic.
+class Mover {
+public:
+    Mover(const test::MemoryStore& store, const std::function<void()>& note)
+        : lattice_(store.dataset().lattice), note_(note) {}
+    std::function<void()> on_answer() {
+        return [this] {
+            if (GroundProbe* const probe = probe_) look(*probe);
+        };
+    }
+    void begin(GroundProbe& probe) { probe_ = &probe; }
+    int click_after() const { return click_after_; }
+    int profile_after() const { return profile_after_; }
+
+private:
+    void look(GroundProbe& probe) {
+        constexpr int kLongEnough = 2000;
+        const int k = ++answers_;
+        if (click_after_ == 0 && (probe.last_hit(Ray::click).question > 0 || k > kLongEnough)) click_after_ = k;
+        if (profile_after_ == 0 && (probe.last_profile() != nullptr || k > kLongEnough)) profile_after_ = k;
+        if (click_after_ == 0 || profile_after_ == 0) (void)probe.height_m(lattice_.x_m(0.01 * k), lattice_.y_m(3));
+        note_();
+    }
+
+    const Lattice lattice_;
+    const std::function<void()> note_;
+    std::atomic<GroundProbe*> probe_ = nullptr;
+    std::atomic<int> answers_ = 0, click_after_ = 0, profile_after_ = 0;
+};
+
 TEST_F(Probe, NoKindWaitsForTheQuestionsOfAnother) {
-    GroundProbe* asked = nullptr;
-    std::atomic<int> heights = 0;
-    std::atomic<bool> ready = false;
-    GroundProbe probe(store_, [&] {
-        if (!ready) return;
-        const int k = ++heights;
-        if (k > 10000) return;
-        const glm::dvec2 p = place(k % 200, 3);
-        (void)asked->height_m(p.x + 0.001 * k, p.y);
-        answers_.note()();
-    });
-    asked = &probe;
+    Mover mover(*store_, answers_.note());
+    GroundProbe probe(store_, mover.on_answer());
+    mover.begin(probe);
     store_->hold();
-    ready = true;
     (void)probe.height_m(place(1, 1).x, place(1, 1).y);
     store_->wait_for_reads(1);
     const auto click = cast_down(probe, Ray::click, 5, 5);
     probe.profile(place(0, 0), place(50, 50), 100);
     store_->release();
     ASSERT_TRUE(answered(probe, Ray::click, click));
-    ASSERT_TRUE(answers_.wait([&] { return probe.last_profile() != nullptr; }));
-    EXPECT_LT(heights, 1000) << "the profile of a hundred heights is read in between";
-    heights = 20000;
+    ASSERT_TRUE(answers_.wait([&] { return mover.profile_after() > 0; }));
+    EXPECT_LE(mover.click_after(), 3);
+    EXPECT_LE(mover.profile_after(), 20) << "read a few heights at a time in between";
+    EXPECT_GT(mover.profile_after(), mover.click_after()) << "keeps nobody waiting to its end";
 }
 
 TEST_F(Probe, AProfileKeepsNobodyWaitingToItsEnd) {
-    GroundProbe probe(store_, answers_.note());
+    Mover mover(*store_, answers_.note());
+    GroundProbe probe(store_, mover.on_answer());
+    mover.begin(probe);
     store_->hold();
     probe.profile(place(0, 0), place(255, 255), 4096);
     store_->wait_for_reads(1);
     const auto click = cast_down(probe, Ray::click, 5, 5);
     store_->release();
-    bool profile_was_done = false;
-    ASSERT_TRUE(answers_.wait([&] {
-        const bool done = probe.last_hit(Ray::click).question == click;
-        profile_was_done = probe.last_profile() != nullptr && answers_.count() == 1;
-        return done;
-    }));
-    EXPECT_FALSE(profile_was_done);
-    EXPECT_TRUE(answers_.wait([&] { return probe.last_profile() != nullptr; }));
+    ASSERT_TRUE(answered(probe, Ray::click, click));
+    ASSERT_TRUE(answers_.wait([&] { return mover.profile_after() > 0; }));
+    EXPECT_EQ(mover.click_after(), 1);
+    EXPECT_GT(mover.profile_after(), 50);
 }
 
 TEST_F(Probe, ADamagedStoreIsNoGround) {
@@ -312,6 +331,25 @@ TEST_F(Probe, AnAnswerOfAStoreThatWasLeftIsDropped) {
     ASSERT_TRUE(answered(probe, Ray::click, click)) << "a click under way is asked of the new store";
     EXPECT_NEAR(probe.last_hit(Ray::click).point->z, other.height_m(33, 44), 1e-6);
     EXPECT_EQ(answers_.count(), 1);
+}
+
+TEST_F(Probe, AHeightOfAStoreThatWasLeftIsDropped) {
+    const test::SyntheticTerrain other = hills(10);
+    const auto after = std::make_shared<test::MemoryStore>(other);
+    GroundProbe probe(store_, answers_.note());
+    const glm::dvec2 p = place(33, 44);
+    store_->hold();
+    after->hold();
+    (void)probe.height_m(p.x, p.y);
+    store_->wait_for_reads(1);
+    probe.use(after);
+    store_->release();
+    after->wait_for_reads(1);
+    EXPECT_FALSE(probe.height_m(p.x, p.y));
+    EXPECT_EQ(answers_.count(), 0);
+    after->release();
+    ASSERT_TRUE(answers_.wait([&] { return probe.height_m(p.x, p.y).has_value(); }));
+    EXPECT_NEAR(*probe.height_m(p.x, p.y), other.height_m(33, 44), 1e-9);
 }
 
 TEST_F(Probe, NothingIsAnsweredAfterItsEnd) {
