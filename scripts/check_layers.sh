@@ -60,6 +60,10 @@ forbid runtime/window "$window" "of runtime/window, window_input, full_screen an
     'runtime/window/(window_input|full_screen|hud(_panels|_profile)?)\.|runtime/window/key_table\.cpp:[0-9]+:#include <GLFW/glfw3\.h>'
 forbid runtime/scene 'runtime/render/' "of runtime/scene, scene_renderer alone knows the renderer:" \
     'runtime/scene/scene_renderer\.'
+forbid runtime/report "$window|runtime/(view|paging|lod|scene|app|window)/" \
+    "runtime/report knows neither terrain nor window:"
+forbid runtime/report 'runtime/render/(\.\.|[^p]|p[^n])' "of runtime/render, reports have png.h alone:"
+forbid "$below_render runtime/render runtime/scene" 'runtime/report/' "runtime/report is for app alone:"
 forbid "tools runtime" "$opengl" "OpenGL and EGL headers stand in runtime/render alone:" 'runtime/render/'
 forbid tools "$window" "tools/ knows no window:"
 forbid "tools runtime" "$images" "OpenImageIO, libgeotiff and libtiff stand in tools/source alone:" 'tools/source/'

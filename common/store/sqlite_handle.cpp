@@ -49,7 +49,18 @@ Result<void> touch(const std::string& path, sqlite3* db) {
 Error sqlite_error(const std::string& path, sqlite3* db, int rc) {
     if ((rc & 0xFF) == SQLITE_BUSY)
         return {ErrorCode::io, fmt::format("{}: another program has kept it locked for too long", path)};
-    return {code_of(rc), fmt::format("{}: {}", path, db != nullptr ? sqlite3_errmsg(db) : sqlite3_errstr(rc))};
+    const char* reason = db != nullptr ? sqlite3_errmsg(db) : sqlite3_errstr(rc);
+    switch (rc & 0xFF) {
+        case SQLITE_NOTADB:
+            return {ErrorCode::store, fmt::format("{}: not a Scree store ({})", path, reason)};
+        case SQLITE_CORRUPT:
+            return {ErrorCode::store,
+                    fmt::format("{}: damaged or cut short ({}); copy it anew or build it again", path, reason)};
+        case SQLITE_FULL:
+            return {ErrorCode::io, fmt::format("{}: no space left on its disk ({})", path, reason)};
+        default:
+            return {code_of(rc), fmt::format("{}: {}", path, reason)};
+    }
 }
 
 Result<Statement> prepare(const std::string& path, sqlite3* db, const std::string& sql) {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/result.h"
-#include "experiments/plot.h"
+#include "runtime/report/plot.h"
 
 namespace scree::chart {
 

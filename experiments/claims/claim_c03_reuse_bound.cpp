@@ -3,7 +3,7 @@
 
 #include "experiments/claims/claims.h"
 #include "experiments/claims/sampling.h"
-#include "experiments/plot.h"
+#include "runtime/report/plot.h"
 
 namespace scree {
 namespace {

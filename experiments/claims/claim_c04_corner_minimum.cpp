@@ -6,7 +6,7 @@
 
 #include "experiments/claims/claims.h"
 #include "experiments/claims/eye_rings.h"
-#include "experiments/plot.h"
+#include "runtime/report/plot.h"
 
 namespace scree {
 namespace {

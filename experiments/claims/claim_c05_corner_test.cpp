@@ -3,7 +3,7 @@
 
 #include "experiments/claims/claims.h"
 #include "experiments/claims/eye_rings.h"
-#include "experiments/plot.h"
+#include "runtime/report/plot.h"
 #include "runtime/lod/reuse.h"
 
 namespace scree {

@@ -4,7 +4,7 @@
 #include "experiments/claims/claims.h"
 #include "experiments/claims/sampling.h"
 #include "experiments/claims/strip.h"
-#include "experiments/plot.h"
+#include "runtime/report/plot.h"
 #include "runtime/lod/block_selection.h"
 #include "runtime/lod/block_world.h"
 

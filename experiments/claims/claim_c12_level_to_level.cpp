@@ -3,7 +3,7 @@
 
 #include "experiments/claims/claims.h"
 #include "experiments/claims/geomip_flight.h"
-#include "experiments/plot.h"
+#include "runtime/report/plot.h"
 
 namespace scree {
 

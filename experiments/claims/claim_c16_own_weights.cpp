@@ -4,7 +4,7 @@
 #include "common/mesh/morphed_vertex.h"
 #include "experiments/claims/claims.h"
 #include "experiments/claims/geomip_flight.h"
-#include "experiments/plot.h"
+#include "runtime/report/plot.h"
 
 namespace scree {
 namespace {

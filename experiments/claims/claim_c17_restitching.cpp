@@ -7,7 +7,7 @@
 #include "experiments/claims/claims.h"
 #include "experiments/claims/geomip_world.h"
 #include "experiments/claims/strip.h"
-#include "experiments/plot.h"
+#include "runtime/report/plot.h"
 
 namespace scree {
 namespace {

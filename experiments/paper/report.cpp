@@ -10,7 +10,7 @@
 
 #include "common/report.h"
 #include "experiments/paper/references.h"
-#include "experiments/plot.h"
+#include "runtime/report/plot.h"
 
 namespace scree::paper {
 namespace {

@@ -10,9 +10,9 @@
 #include "common/report.h"
 #include "runtime/app/block_display.h"
 #include "runtime/app/block_scene.h"
-#include "runtime/app/statistics.h"
 #include "runtime/lod/block_truth.h"
 #include "runtime/render/png.h"
+#include "runtime/report/statistics.h"
 #include "runtime/scene/frame_governor.h"
 
 namespace scree {

@@ -1,10 +1,7 @@
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "common/cli/arguments.h"
@@ -15,13 +12,15 @@
 #include "runtime/app/comparison_table.h"
 #include "runtime/app/view_options.h"
 #include "runtime/paging/memory_plan.h"
+#include "runtime/report/html.h"
+#include "runtime/report/report_folder.h"
 
 namespace scree {
 namespace {
 
-namespace fs = std::filesystem;
-
-constexpr std::array<const char*, 3> kReportFiles{"index.html", "comparison.csv", "comparison.json"};
+Result<ReportFolder> report_folder(const std::string& name, bool force) {
+    return ReportFolder::prepare(name, {"index.html", "comparison.csv", "comparison.json"}, force);
+}
 
 struct CompareOptions {
     int frames = 12, rounds = 3;
@@ -32,90 +31,10 @@ struct CompareOptions {
     Wish wish;
 };
 
-/// A folder that appears whole under its name or not at all.
-class ReportFolder {
-public:
-    /// Errors: ErrorCode::usage where there is something that must not be replaced; ErrorCode::io.
-    static Result<ReportFolder> prepare(const std::string& name, bool force) {
-        ReportFolder folder;
-        folder.path_ = fs::absolute(name).lexically_normal();
-        if (folder.path_.filename().empty()) folder.path_ = folder.path_.parent_path();
-        std::error_code failed;
-        const fs::file_status there = fs::symlink_status(folder.path_, failed);
-        if (!fs::exists(there)) return folder;
-        if (!fs::is_directory(there))
-            return Error{ErrorCode::usage, fmt::format("--report {}: is there, and no folder", name)};
-        fs::directory_iterator files(folder.path_, failed);
-        if (failed) return Error{ErrorCode::io, fmt::format("--report {}: {}", name, failed.message())};
-        for (; !failed && files != fs::directory_iterator(); files.increment(failed)) {
-            const std::string file = files->path().filename().string();
-            // Nothing but an earlier report is ever removed.
-            if (std::find(kReportFiles.begin(), kReportFiles.end(), file) == kReportFiles.end())
-                return Error{
-                    ErrorCode::usage,
-                    fmt::format("--report {}: has {}, which is of no report; name another folder", name, file)};
-            if (!force)
-                return Error{ErrorCode::usage, fmt::format("--report {}: is not empty; --force replaces it", name)};
-        }
-        return folder;
-    }
-
-    Result<void> write(const std::array<std::string, 3>& texts) const {
-        const fs::path partial = sibling("partial"), old = sibling("old");
-        if (auto ok = fill(partial, texts); !ok) {
-            discard(partial);
-            return ok;
-        }
-        std::error_code failed, none;
-        const bool replaced = fs::exists(path_, none);
-        if (replaced) fs::rename(path_, old, failed);
-        if (!failed) {
-            fs::rename(partial, path_, failed);
-            if (failed && replaced) fs::rename(old, path_, none);
-        }
-        if (failed) {
-            discard(partial);
-            return Error{ErrorCode::io, fmt::format("{}: {}", path_.string(), failed.message())};
-        }
-        if (replaced) discard(old);
-        return {};
-    }
-
-private:
-    fs::path sibling(const char* what) const {
-        return path_.parent_path() / fmt::format("{}.{}.{}", path_.filename().string(), getpid(), what);
-    }
-    static Result<void> fill(const fs::path& folder, const std::array<std::string, 3>& texts) {
-        std::error_code failed;
-        fs::create_directory(folder, failed);
-        if (failed) return Error{ErrorCode::io, fmt::format("{}: {}", folder.string(), failed.message())};
-        for (std::size_t k = 0; k < texts.size(); ++k)
-            if (auto ok = write_text((folder / kReportFiles[k]).string(), texts[k]); !ok) return ok;
-        return {};
-    }
-    // File by file: whatever else somebody has put there meanwhile stays.
-    static void discard(const fs::path& folder) {
-        std::error_code ignored;
-        for (const char* file : kReportFiles) fs::remove(folder / file, ignored);
-        fs::remove(folder, ignored);
-    }
-    fs::path path_;
-};
-
-std::string quoted(const std::string& text) {
-    const bool plain = !text.empty() && text.find_first_not_of(
-                                            "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
-                                            "0123456789_./-+=:,@%") == std::string::npos;
-    if (plain) return text;
-    std::string q = "'";
-    for (const char c : text) q += c == '\'' ? std::string("'\\''") : std::string(1, c);
-    return q + "'";
-}
-
 // With what was measured under, so that what is seen is what was measured.
 std::string view_command(const ComparisonCase& c, const ViewOptions& o) {
-    std::string line =
-        fmt::format("scree-view view {} {} --size {}x{}", quoted(o.store), options_of(c), o.width_px, o.height_px);
+    std::string line = fmt::format("scree-view view {} {} --size {}x{}", shell_quoted(o.store), options_of(c),
+                                   o.width_px, o.height_px);
     if (o.fov_deg != ViewOptions{}.fov_deg) line += fmt::format(" --fov {}", o.fov_deg);
     if (o.exaggeration != 1) line += fmt::format(" --exaggeration {}", o.exaggeration);
     if (o.curvature_text != ViewOptions{}.curvature_text) line += fmt::format(" --curvature {}", o.curvature_text);
@@ -166,11 +85,14 @@ Result<void> write(const Comparison& comparison, const ViewOptions& o, const Com
                    const std::optional<Wish>& wish, const std::string& command) {
     const std::string json = comparison_json(comparison, wish).dump(2) + "\n";
     if (!c.report.empty()) {
-        auto folder = ReportFolder::prepare(c.report, c.force);
+        auto folder = report_folder(c.report, c.force);
         if (!folder) return folder.error();
         auto page = comparison_page(comparison, wish, command);
         if (!page) return page.error();
-        if (auto ok = folder->write({*page, comparison_csv(comparison), json}); !ok) return ok;
+        if (auto ok = folder->write(
+                {{"index.html", *page}, {"comparison.csv", comparison_csv(comparison)}, {"comparison.json", json}});
+            !ok)
+            return ok;
     }
     if (!c.csv.empty())
         if (auto ok = write_text(c.csv, comparison_csv(comparison)); !ok) return ok;
@@ -197,7 +119,7 @@ void tell(const Comparison& comparison, const ViewOptions& o, const CompareOptio
 
 Result<bool> compare(const ViewOptions& o, const CompareOptions& c) {
     if (!c.report.empty())
-        if (auto folder = ReportFolder::prepare(c.report, c.force); !folder) return folder.error();
+        if (auto folder = report_folder(c.report, c.force); !folder) return folder.error();
     auto comparison = measure(o, c);
     if (!comparison) return comparison.error();
     const std::optional<Wish> wish = c.recommended ? std::optional(c.wish) : std::nullopt;

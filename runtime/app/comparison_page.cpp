@@ -11,42 +11,14 @@
 #include <vector>
 
 #include "runtime/app/comparison_table.h"
-#include "runtime/render/png.h"
+#include "runtime/report/html.h"
 
 namespace scree {
 namespace {
 
+/// Beyond the style of all pages: colour is a family of methods.
 constexpr std::string_view kStyle = R"css(
-:root { color-scheme: light dark; --page: #ffffff; --ink: #1b1f24; --soft: #59636e; --rule: #d5dae0; --panel: #f6f8fa;
-  --geomip: #0b62c4; --rsg: #c2410c; --block: #0f7b4f; --good: #0f7b4f; --bad: #b3261e; }
-@media (prefers-color-scheme: dark) { :root { --page: #14171b; --ink: #e6e9ed; --soft: #a0aab5; --rule: #3a424c;
-  --panel: #1d2227; --geomip: #6cb2ff; --rsg: #ff9a5c; --block: #57d39b; --good: #57d39b; --bad: #ff8a80; } }
-* { box-sizing: border-box; }
-body { margin: 0 auto; padding: 2rem 1.25rem 4rem; max-width: 76rem; background: var(--page); color: var(--ink);
-  font: 16px/1.5 system-ui, -apple-system, "Segoe UI", Roboto, "Noto Sans", sans-serif; }
-h1 { font-size: 1.7rem; line-height: 1.2; margin: 0 0 .3rem; }
-h2 { font-size: 1.2rem; margin: 2.6rem 0 .4rem; }
-p, li { max-width: 48rem; }
-p { margin: .4rem 0 .9rem; }
-.soft { color: var(--soft); }
-.note { border-left: 4px solid var(--geomip); background: var(--panel); padding: .7rem 1rem; margin: 1.2rem 0; }
-.note.bad { border-color: var(--bad); }
-code { font: .88em ui-monospace, "DejaVu Sans Mono", Menlo, monospace; overflow-wrap: anywhere; }
-.scroll { overflow-x: auto; }
-table { border-collapse: collapse; font-size: .88rem; font-variant-numeric: tabular-nums; min-width: 100%; }
-th, td { padding: .3rem .6rem; text-align: right; border-bottom: 1px solid var(--rule); white-space: nowrap; }
-th { color: var(--soft); font-weight: 600; vertical-align: bottom; white-space: normal; line-height: 1.25; }
-th.l, td.l { text-align: left; }
-.words td { white-space: normal; vertical-align: top; }
-.words td:first-child, .words .soft { white-space: nowrap; }
-tr.loose td { color: var(--soft); }
-td.bad { color: var(--bad); font-weight: 600; }
-.charts { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(30rem, 100%), 1fr)); gap: 1.6rem; }
-figure { margin: 0; }
-figcaption { font-weight: 600; font-size: .95rem; margin-bottom: .2rem; }
-.charts svg { width: 100%; height: auto; display: block; }
-svg text { fill: var(--soft); font: 13px system-ui, -apple-system, "Segoe UI", Roboto, "Noto Sans", sans-serif; }
-svg .grid { stroke: var(--rule); stroke-width: 1; }
+:root { --geomip: var(--blue); --rsg: var(--orange); --block: var(--green); }
 svg .front { fill: none; stroke: var(--ink); stroke-width: 9; stroke-opacity: .13; stroke-linejoin: round;
   stroke-linecap: round; }
 svg .ring { fill: none; stroke: var(--ink); stroke-width: 1.5; }
@@ -63,12 +35,6 @@ svg .ring { fill: none; stroke: var(--ink); stroke-width: 1.5; }
 .legend svg { width: 34px; height: 16px; flex: none; }
 body[data-method] .curve { opacity: .15; }
 body[data-method] .curve.chosen { opacity: 1; }
-.pictures { display: grid; grid-template-columns: repeat(auto-fit, minmax(19rem, 1fr)); gap: 1.2rem; }
-.pictures img { width: 100%; height: auto; display: block; border: 1px solid var(--rule); margin-bottom: 3px; }
-.pictures figcaption { font-weight: 400; font-size: .86rem; }
-dl code { white-space: nowrap; }
-dt { font-weight: 600; margin-top: .7rem; }
-dd { margin: 0; max-width: 48rem; }
 )css";
 
 // Pointing at a name in the legend leaves its curve alone in the charts.
@@ -84,54 +50,8 @@ for (const item of document.querySelectorAll('.legend [data-of]')) {
 }
 )js";
 
-std::string escaped(std::string_view text) {
-    std::string s;
-    for (const char c : text) switch (c) {
-            case '&':
-                s += "&amp;";
-                break;
-            case '<':
-                s += "&lt;";
-                break;
-            case '>':
-                s += "&gt;";
-                break;
-            case '"':
-                s += "&quot;";
-                break;
-            default:
-                s += c;
-        }
-    return s;
-}
-
-std::string base64(const std::vector<std::uint8_t>& bytes) {
-    constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    std::string s;
-    s.reserve((bytes.size() + 2) / 3 * 4);
-    for (std::size_t k = 0; k < bytes.size(); k += 3) {
-        const std::size_t left = std::min<std::size_t>(3, bytes.size() - k);
-        std::uint32_t group = 0;
-        for (std::size_t j = 0; j < 3; ++j) group = group << 8 | (j < left ? bytes[k + j] : 0u);
-        for (std::size_t j = 0; j < 4; ++j) s += j <= left ? kDigits[group >> (18 - 6 * j) & 63] : '=';
-    }
-    return s;
-}
-
-// Three significant digits, as people write them.
-std::string number(double v) {
-    if (!(std::abs(v) < kBeyondMeasure)) return "&infin;";
-    if (v >= 1e6) return fmt::format("{:.3g} M", v / 1e6);
-    if (v >= 1e4) return fmt::format("{:.3g} k", v / 1e3);
-    if (v >= 100) return fmt::format("{:.0f}", v);
-    return fmt::format("{:.3g}", v);
-}
-
-std::string tick_text(double v) {
-    if (v >= 1e6) return fmt::format("{:g}M", v / 1e6);
-    if (v >= 1e3) return fmt::format("{:g}k", v / 1e3);
-    return fmt::format("{:g}", v);
-}
+// What could not be measured is said to be without end.
+std::string number(double v) { return v >= kBeyondMeasure ? "&infin;" : short_number(v); }
 
 /// One method of the tolerance sweep: its cases in the order of tau.
 struct Curve {
@@ -265,12 +185,12 @@ std::string chart(const Comparison& comparison, const std::vector<Curve>& curves
         svg += fmt::format(
             "<line class=\"grid\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1}\" y2=\"{2}\"/><text x=\"{0:.1f}\" y=\"{3}\" "
             "text-anchor=\"middle\">{4}</text>\n",
-            across.at(v), kTop, kHeight - kBottom, kHeight - kBottom + 17, tick_text(v));
+            across.at(v), kTop, kHeight - kBottom, kHeight - kBottom + 17, tick_number(v));
     for (const double v : up.ticks())
         svg += fmt::format(
             "<line class=\"grid\" x1=\"{0}\" x2=\"{1}\" y1=\"{2:.1f}\" y2=\"{2:.1f}\"/><text x=\"{3}\" y=\"{4:.1f}\" "
             "text-anchor=\"end\">{5}</text>\n",
-            kLeft, kWidth - kRight, up.at(v), kLeft - 7, up.at(v) + 4, tick_text(v));
+            kLeft, kWidth - kRight, up.at(v), kLeft - 7, up.at(v) + 4, tick_number(v));
     svg += fmt::format("<text x=\"{:.0f}\" y=\"{}\" text-anchor=\"middle\">greatest true error, pixels</text>\n",
                        (kLeft + kWidth - kRight) / 2, kHeight - 8);
     svg += fmt::format("<text transform=\"translate(13 {:.0f}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
@@ -318,22 +238,6 @@ std::string legend(const std::vector<Curve>& curves) {
            "class=\"ring\" cx=\"17\" cy=\"8\" r=\"6\"/></svg>Pareto front</li>\n</ul>\n";
 }
 
-std::string table(const std::vector<std::string>& heads, const std::vector<std::vector<std::string>>& rows,
-                  std::size_t text_columns, const std::vector<std::string>& row_classes = {}) {
-    std::string html = fmt::format("<div class=\"scroll\"><table{}><thead><tr>",
-                                   text_columns == heads.size() ? " class=\"words\"" : "");
-    const auto side = [&](std::size_t column) { return column < text_columns ? " class=\"l\"" : ""; };
-    for (std::size_t k = 0; k < heads.size(); ++k) html += fmt::format("<th{}>{}</th>", side(k), heads[k]);
-    html += "</tr></thead><tbody>\n";
-    for (std::size_t r = 0; r < rows.size(); ++r) {
-        html += r < row_classes.size() && !row_classes[r].empty() ? fmt::format("<tr class=\"{}\">", row_classes[r])
-                                                                  : std::string("<tr>");
-        for (std::size_t k = 0; k < rows[r].size(); ++k) html += fmt::format("<td{}>{}</td>", side(k), rows[r][k]);
-        html += "</tr>\n";
-    }
-    return html + "</tbody></table></div>\n";
-}
-
 std::string cheapest_section(const Comparison& comparison) {
     std::vector<std::vector<std::string>> rows;
     for (const double error_px : kErrors_px) {
@@ -350,15 +254,13 @@ std::string cheapest_section(const Comparison& comparison) {
     return "<h2>For this error, the cheapest method</h2>\n<p>Every case whose greatest true error on this path was "
            "within the error of the row. The first two columns have only methods that promise a bound everywhere; the "
            "last has those that do not, which may err by more elsewhere.</p>\n" +
-           table({"true error at most", "least selection + drawing", "fewest triangles", "least, without a promise"},
-                 rows, 4);
+           html_table(
+               {"true error at most", "least selection + drawing", "fewest triangles", "least, without a promise"},
+               rows, 4);
 }
 
 Result<std::string> image(const Comparison& c, const std::vector<std::uint8_t>& rgb, const std::string& what) {
-    auto png = encode_png(c.picture_width_px, c.picture_height_px, rgb);
-    if (!png) return png.error();
-    return fmt::format("<img alt=\"{}\" width=\"{}\" height=\"{}\" src=\"data:image/png;base64,{}\">", escaped(what),
-                       c.picture_width_px, c.picture_height_px, base64(*png));
+    return image_html({c.picture_width_px, c.picture_height_px, rgb}, what);
 }
 
 Result<std::string> picture_section(const Comparison& c) {
@@ -387,8 +289,6 @@ Result<std::string> picture_section(const Comparison& c) {
     return html + "</div>\n";
 }
 
-std::string megabytes(std::int64_t bytes) { return fmt::format("{:.1f}", static_cast<double>(bytes) / 1e6); }
-
 std::string sweep_table(const Comparison& comparison, Sweep sweep) {
     std::vector<std::vector<std::string>> rows;
     for (const ComparedCase& c : comparison.cases) {
@@ -402,7 +302,7 @@ std::string sweep_table(const Comparison& comparison, Sweep sweep) {
                         fmt::format("{} of {}", f.budget_limited_frames, comparison.frames)});
     }
     if (rows.empty()) return "<p class=\"soft\">Not measured.</p>\n";
-    return table(
+    return html_table(
         {sweep == Sweep::texture ? "texel covers" : "budget", "tiles kept, MB", "taken of the budget, MB", "triangles",
          "frame, ms", "promised, px", "true max, px", "PSNR, dB", "SSIM", "frames the budget bound"},
         rows, 0);
@@ -428,10 +328,10 @@ std::string all_cases(const Comparison& comparison, const std::vector<Curve>& cu
                             : f.kept  ? "kept"
                                       : "BROKEN"});
         }
-    return table({"method", "tau, px", "triangles", "LOD, ms", "LOD cold, ms", "draw, ms", "frame, ms", "frame p99, ms",
-                  "tiles, MB", "promised, px", "true max, px", "p99, px", "mean, px", "PSNR, dB", "SSIM",
-                  "holes, cells", "cracks", "promise"},
-                 rows, 1, row_classes);
+    return html_table({"method", "tau, px", "triangles", "LOD, ms", "LOD cold, ms", "draw, ms", "frame, ms",
+                       "frame p99, ms", "tiles, MB", "promised, px", "true max, px", "p99, px", "mean, px", "PSNR, dB",
+                       "SSIM", "holes, cells", "cracks", "promise"},
+                      rows, 1, row_classes);
 }
 
 std::string quantum_text(const HeightQuantum& q) {
@@ -536,32 +436,33 @@ Result<std::string> comparison_page(const Comparison& c, const std::optional<Wis
     const std::vector<Curve> curves = curves_of(c);
     auto pictures = picture_section(c);
     if (!pictures) return pictures;
-    std::string html = fmt::format(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" "
-        "content=\"width=device-width, initial-scale=1\">\n<title>What accuracy costs: "
-        "{0}</title>\n<style>{1}</style>\n"
-        "</head>\n<body>\n<h1>What accuracy costs: {0}</h1>\n<p class=\"soft\">{2} cases, {3} poses, {4} x {5} pixels, "
-        "drawn by {6}. Times are of this machine; triangles and errors are not.</p>\n",
-        escaped(c.store), kStyle, c.cases.size(), c.frames, c.width_px, c.height_px, escaped(c.renderer));
-    html += verdict(c, wish, command);
-    html += cheapest_section(c);
-    html +=
-        "<h2>Cost against true error</h2>\n<p>A line a method, a mark a tolerance; further left is truer, further down "
-        "is "
-        "cheaper. Both axes are logarithmic. Ringed: no method with a promise is both truer and cheaper (the Pareto "
-        "front). Hollow and dashed: no promise.</p>\n<div class=\"charts\">\n";
-    html += chart(c, curves, Cost::triangles, "Triangles", "triangles a frame, mean", "triangles");
-    html += chart(c, curves, Cost::frame_ms, "Selection and drawing", "frame, milliseconds", "ms");
-    html += chart(c, curves, Cost::lod_ms, "Selection alone", "LOD, CPU milliseconds", "ms");
-    html += legend(curves) + "</div>\n" + *pictures;
-    html += "<h2>Texture tolerance</h2>\n<p>Against full resolution in heights and textures.</p>\n" +
-            sweep_table(c, Sweep::texture);
-    html +=
-        "<h2>Memory budget</h2>\n<p>Where the budget binds, the tolerance rises.</p>\n" + sweep_table(c, Sweep::budget);
-    html += settings_section(c);
-    html += "<h2>All methods and tolerances</h2>\n" + all_cases(c, curves);
-    html += how_section(c);
-    return html + fmt::format("<script>{}</script>\n</body>\n</html>\n", kScript);
+    HtmlPage page(
+        fmt::format("What accuracy costs: {}", c.store),
+        fmt::format("{} cases, {} poses, {} x {} pixels, drawn by {}. Times are of this machine; triangles and errors "
+                    "are not.",
+                    c.cases.size(), c.frames, c.width_px, c.height_px, escaped(c.renderer)));
+    page.style(kStyle);
+    page.script(kScript);
+    page.add(verdict(c, wish, command));
+    page.add(cheapest_section(c));
+    page.section("Cost against true error",
+                 "A line a method, a mark a tolerance; further left is truer, further down is cheaper. Both axes are "
+                 "logarithmic. Ringed: no method with a promise is both truer and cheaper (the Pareto front). Hollow "
+                 "and dashed: no promise.");
+    page.add("<div class=\"charts\">\n");
+    page.add(chart(c, curves, Cost::triangles, "Triangles", "triangles a frame, mean", "triangles"));
+    page.add(chart(c, curves, Cost::frame_ms, "Selection and drawing", "frame, milliseconds", "ms"));
+    page.add(chart(c, curves, Cost::lod_ms, "Selection alone", "LOD, CPU milliseconds", "ms"));
+    page.add(legend(curves) + "</div>\n" + *pictures);
+    page.section("Texture tolerance", "Against full resolution in heights and textures.");
+    page.add(sweep_table(c, Sweep::texture));
+    page.section("Memory budget", "Where the budget binds, the tolerance rises.");
+    page.add(sweep_table(c, Sweep::budget));
+    page.add(settings_section(c));
+    page.section("All methods and tolerances");
+    page.add(all_cases(c, curves));
+    page.add(how_section(c));
+    return std::move(page).finish();
 }
 
 }  // namespace scree

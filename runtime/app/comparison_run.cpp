@@ -17,7 +17,7 @@
 #include "runtime/app/coverage.h"
 #include "runtime/app/display.h"
 #include "runtime/app/image_difference.h"
-#include "runtime/app/statistics.h"
+#include "runtime/report/statistics.h"
 #include "runtime/view/camera.h"
 
 namespace scree {

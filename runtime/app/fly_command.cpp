@@ -13,9 +13,9 @@
 #include "runtime/app/coverage.h"
 #include "runtime/app/display.h"
 #include "runtime/app/see_through.h"
-#include "runtime/app/statistics.h"
 #include "runtime/app/view_options.h"
 #include "runtime/render/png.h"
+#include "runtime/report/statistics.h"
 #include "runtime/scene/frame_governor.h"
 
 namespace scree {

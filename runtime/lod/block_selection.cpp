@@ -14,6 +14,9 @@ bool add_closed(const Bisection& bisection, std::int32_t vertex, std::uint8_t* a
     return true;
 }
 
+namespace {
+
+// The triangles that a triangle split at level `level` (2n + 1: never) is drawn as.
 std::uint32_t* emit_triangles(const Bisection& bisection, const std::uint8_t* active, const BisectionTriangle& triangle,
                               int level, std::uint32_t* out) {
     if (level <= bisection.levels() && active[triangle.middle()] != 0) {
@@ -25,6 +28,8 @@ std::uint32_t* emit_triangles(const Bisection& bisection, const std::uint8_t* ac
     *out++ = static_cast<std::uint32_t>(triangle.right);
     return out;
 }
+
+}  // namespace
 
 BlockSelection::BlockSelection(const Bisection& bisection)
     : bisection_(&bisection), active_(bisection.vertex_count()), lock_(bisection.vertex_count()) {

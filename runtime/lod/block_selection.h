@@ -12,10 +12,6 @@ namespace scree {
 
 /// Adds a vertex and whatever it depends on to `active`, a byte a vertex. True if it was not there.
 bool add_closed(const Bisection& bisection, std::int32_t vertex, std::uint8_t* active);
-/// Writes the triangles that a triangle split at level `level` (2n + 1: never) is drawn as, three indices each; returns
-/// the end of what was written.
-std::uint32_t* emit_triangles(const Bisection& bisection, const std::uint8_t* active, const BisectionTriangle& triangle,
-                              int level, std::uint32_t* out);
 /// At most so many indices make a block.
 inline std::size_t most_indices(const Bisection& bisection) {
     return 6 * static_cast<std::size_t>(bisection.cells()) * static_cast<std::size_t>(bisection.cells());

@@ -140,23 +140,8 @@ void BlockWorld::make_tables() {
         parent_0_.push_back(place(b.vertex(v).parents[0]));
         parent_1_.push_back(place(b.vertex(v).parents[1]));
     }
-    for (const BisectionTriangle& root : b.roots()) add_to_walk(root, 1);
-    scratch_.resize(static_cast<std::size_t>(6 * b.cells() * b.cells() + 3));
-}
-
-void BlockWorld::add_to_walk(const BisectionTriangle& t, int level) {
-    const std::size_t at = walk_.size();
-    const bool splits = level <= bisection_->levels();
-    walk_.push_back(
-        {static_cast<std::uint16_t>(splits ? static_cast<std::size_t>(t.middle()) : bisection_->vertex_count()),
-         0,
-         {static_cast<std::uint16_t>(t.apex), static_cast<std::uint16_t>(t.left),
-          static_cast<std::uint16_t>(t.right)}});
-    if (splits) {
-        add_to_walk(t.left_half(), level + 1);
-        add_to_walk(t.right_half(), level + 1);
-    }
-    walk_[at].next = static_cast<std::uint16_t>(walk_.size());
+    walk_ = std::make_unique<TriangleWalk>(b);
+    scratch_.resize(TriangleWalk::room(b));
 }
 
 void BlockWorld::make_block(const HeightRaster& raster, int index) {
@@ -426,19 +411,9 @@ void BlockWorld::regenerate(int index, const Sighting& sighting) {
 void BlockWorld::make_mesh(int index) {
     const std::uint8_t* active = active_.data() + static_cast<std::size_t>(index) * (bisection_->vertex_count() + 1);
     const std::uint32_t base = static_cast<std::uint32_t>(index) * vertices_per_block();
-    std::uint32_t* out = scratch_.data();
-    for (std::size_t at = 0; at < walk_.size();) {
-        const WalkNode& node = walk_[at];
-        const bool split = active[node.middle] != 0;
-        // Written whether it is drawn or not, then kept or not: what splits cannot be foretold.
-        out[0] = base + node.corners[0];
-        out[1] = base + node.corners[1];
-        out[2] = base + node.corners[2];
-        out += split ? 0 : 3;
-        at = split ? at + 1 : node.next;
-    }
+    const std::uint32_t* out = walk_->emit(active, base, scratch_.data());
     Block& block = blocks_[static_cast<std::size_t>(index)];
-    block.mesh.assign(scratch_.data(), out);
+    block.mesh.assign(static_cast<const std::uint32_t*>(scratch_.data()), out);
     ++block.version;
 }
 

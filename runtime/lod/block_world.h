@@ -18,6 +18,7 @@
 #include "runtime/lod/height_raster.h"
 #include "runtime/lod/lod_method.h"
 #include "runtime/lod/reuse.h"
+#include "runtime/lod/triangle_walk.h"
 #include "runtime/view/camera.h"
 #include "runtime/view/frustum.h"
 
@@ -150,16 +151,9 @@ private:
     struct LevelMaxima {
         float delta = 0, error = 0, radius = 0;
     };
-    /// A triangle of the bisection, in the order of a walk down the tree: where its middle is active the next one is
-    /// its first half, else `next`.
-    struct WalkNode {
-        std::uint16_t middle = 0, next = 0;  ///< a middle that is never active: cannot be split
-        std::array<std::uint16_t, 3> corners{};
-    };
 
     BlockWorld() = default;
     void make_tables();
-    void add_to_walk(const BisectionTriangle& triangle, int level);
     void make_block(const HeightRaster& raster, int block);
     void bound_errors(int block);
     void count_dike(DikeLie lie, int a, int b, bool on_b, std::span<float> error, std::span<float> radius) const;
@@ -201,7 +195,7 @@ private:
     std::vector<float> x_, y_;
     std::vector<std::uint16_t> vertex_of_, parent_0_, parent_1_, order_of_;
     std::vector<std::size_t> first_of_level_;
-    std::vector<WalkNode> walk_;
+    std::unique_ptr<TriangleWalk> walk_;
 
     std::vector<double> z_;                                ///< by vertex
     std::vector<float> local_z_, delta_, error_, radius_;  ///< by block and order

@@ -610,6 +610,13 @@ Cut::Drawn Cut::drawn(std::int32_t index) {
     return drawn;
 }
 
+std::int32_t Cut::drawn_beside(std::int32_t leaf, int direction) {
+    const std::int32_t other = neighbour(leaf, direction);
+    if (other < 0) return -1;
+    const CutNode& beside = nodes_[static_cast<std::size_t>(other)];
+    return beside.split || !beside.visible() ? -1 : other;
+}
+
 double Cut::drawn_error_m(const CutNode& leaf, const Drawn& drawn) const {
     const int geomip = drawn.exponent - minimum_exponent(leaf);
     const double thinned_m = error_m(leaf, geomip);

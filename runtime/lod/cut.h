@@ -132,6 +132,8 @@ public:
         std::array<float, 4> edge_morph{};
     };
     Drawn drawn(std::int32_t leaf);
+    /// The visible leaf beside it that is as large or larger, or -1. `direction`: north, east, south, west.
+    std::int32_t drawn_beside(std::int32_t leaf, int direction);
     /// Greatest error of a leaf drawn so, metres.
     double drawn_error_m(const CutNode& leaf, const Drawn& drawn) const;
     /// node.metres_per_px of the guaranteed metric, whichever the cut was made by.

@@ -14,14 +14,15 @@
 #include "runtime/lod/page_measure.h"
 #include "runtime/lod/reuse.h"
 #include "runtime/lod/tile_vertices.h"
+#include "runtime/lod/triangle_walk.h"
 
 namespace scree {
 namespace {
 
-/// Rungs of block thresholds an octave: 8 cost 4 % of triangles on average; fewer cost more, more are left sooner.
-constexpr double kRungsPerOctave = 8;
-constexpr int kNoRung = std::numeric_limits<int>::min();
-constexpr int kLeastRung = kNoRung + 1;  ///< threshold 0: whatever has an error at all
+/// Rungs of block thresholds an octave: fewer cost triangles (6: 2 % more than 8), more are left sooner.
+constexpr int kRungsPerOctave = 6;
+/// Below, the threshold is 0: whatever has an error at all.
+constexpr double kLeastThreshold_m = 1e-30;
 /// Above every error: an eye may stand so far off that its distance is infinite.
 constexpr double kGreatestThreshold_m = 1e30;
 /// Where meshes do not fit into the pool the tolerance grows by eighths of an octave.
@@ -40,7 +41,7 @@ struct Chosen {
     std::uint32_t edge_mask = 0;
     std::int32_t part_level = 0;
     std::uint32_t seen_by = 0;
-    int rung = kNoRung;
+    double least_m = 0, beyond_m = 0;  ///< block thresholds that it holds for: from the least, below the other
     double tau_px = 0, half_curvature = 0;
     std::array<double, kMostEyes> error_px{};
     std::array<glm::dvec3, kMostEyes> eyes{};
@@ -49,21 +50,15 @@ struct Chosen {
 // What is kept of a height slot.
 struct SlotState {
     Chosen chosen;
-    TileBorder own;      ///< of what was chosen
-    TileBorder drawn;    ///< with what neighbours added, of `mesh`
     bool made = false;   ///< `mesh` is of what was chosen last and of `drawn`
     bool whole = false;  ///< nothing is dropped: drawn by its pattern
     MeshRange mesh;
     std::vector<std::uint32_t> cell_starts;  ///< of its parts' cells in the mesh, Morton order, and the end
 };
 
-// A tile drawn in this frame.
-struct Drawn {
-    TileShape shape;
-    std::uint32_t seen_by = 0;
-    std::int32_t part_level = 0;  ///< the finest part that it is drawn in
-    Box box;
-    std::int64_t views = 0;
+// A rung of the ladder of block thresholds.
+struct Rung {
+    double least_m = 0, beyond_m = 0;
 };
 
 }  // namespace
@@ -76,30 +71,48 @@ struct PageMesher::Impl {
           m(1 << n),
           vertices(d, height_slots),
           edges(d.lattice),
+          walks{TriangleWalk(vertices.bisection({0, 0, 0})), TriangleWalk(vertices.bisection({0, 1, 0}))},
           states(static_cast<std::size_t>(height_slots)),
           chosen(states.size() * vertices.vertex_count()),
-          set(vertices.vertex_count()),
+          borders(states.size() * 2 * edges.words()),
+          set(vertices.vertex_count() + 1),
           pool(meshes),
-          buffer(pool.largest_mesh()) {}
+          buffer(TriangleWalk::room(vertices.bisection({0, 0, 0}))) {
+        for (int k = 0; k < kRungsPerOctave; ++k)
+            rungs[static_cast<std::size_t>(k)] = std::exp2(k / double{kRungsPerOctave});
+    }
 
     const Dataset dataset;  // a copy: the store may be updated under it
     LodSettings lod;
     int n, m;
     TileVertices vertices;
     EdgeAgreement edges;
+    std::array<TriangleWalk, 2> walks;  ///< of even and odd tiles
+    std::array<double, kRungsPerOctave> rungs{};
     std::vector<SlotState> states;
-    std::vector<std::uint8_t> chosen;  ///< by slot, an entry a vertex: selected for the tile's own sake
-    std::vector<std::uint8_t> set;     ///< a buffer: of one tile
+    std::vector<std::uint8_t> chosen;    ///< by slot, an entry a vertex: selected for the tile's own sake
+    std::vector<std::uint64_t> borders;  ///< by slot: of what was chosen; with what neighbours added, of its mesh
+    std::vector<std::uint8_t> set;       ///< a buffer: of one tile, and a vertex that never is
     MeshPool& pool;
     std::vector<std::uint32_t> buffer;
     MeshCounters counters;
-    std::vector<Drawn> tiles;  ///< of the frame, in the order of edges.tiles()
-    std::vector<std::int32_t> tile_of_slot;
+    std::span<const DrawnTile> tiles;              ///< of the frame
+    const Residency* residency = nullptr;          ///< of the frame
+    std::vector<std::int32_t> part_level_of_slot;  ///< the finest part that a tile is drawn in; empty: all are whole
 
-    SlotState& state_of(const Drawn& tile) { return states[static_cast<std::size_t>(tile.shape.slot)]; }
-    const SlotState& state_of(const Drawn& tile) const { return states[static_cast<std::size_t>(tile.shape.slot)]; }
-    std::uint8_t* chosen_of(const Drawn& tile) {
-        return chosen.data() + static_cast<std::size_t>(tile.shape.slot) * vertices.vertex_count();
+    SlotState& state_of(const DrawnTile& tile) { return states[static_cast<std::size_t>(tile.height_slot)]; }
+    const SlotState& state_of(const DrawnTile& tile) const {
+        return states[static_cast<std::size_t>(tile.height_slot)];
+    }
+    std::uint8_t* chosen_of(const DrawnTile& tile) {
+        return chosen.data() + static_cast<std::size_t>(tile.height_slot) * vertices.vertex_count();
+    }
+    TileBorder own_border(const DrawnTile& tile) {
+        return borders.data() + static_cast<std::size_t>(tile.height_slot) * 2 * edges.words();
+    }
+    TileBorder drawn_border(const DrawnTile& tile) { return own_border(tile) + edges.words(); }
+    std::int32_t part_level_of(const DrawnTile& tile) const {
+        return part_level_of_slot.empty() ? 0 : part_level_of_slot[static_cast<std::size_t>(tile.height_slot)];
     }
 
     void put(std::int32_t slot, std::span<const SlotVertex> from, std::span<const VertexCost> costs) {
@@ -109,33 +122,29 @@ struct PageMesher::Impl {
 
     // --- the frame's tiles ---
 
-    void gather(std::span<const Camera> views, double half_curvature, const Residency& residency,
-                const Selection& selection) {
-        tiles.clear();
-        edges.tiles().clear();
-        tile_of_slot.assign(states.size(), -1);
-        for (std::size_t v = 0; v < selection.draws.size(); ++v)
-            for (const DrawItem& item : selection.draws[v]) {
-                std::int32_t& tile = tile_of_slot[static_cast<std::size_t>(item.height_slot)];
-                if (tile < 0) {
-                    tile = static_cast<std::int32_t>(tiles.size());
-                    const auto& header = residency.heights.headers[static_cast<std::size_t>(item.height_slot)];
-                    tiles.push_back({{item.height_slot, item.tile, item.geomip, item.edge_mask,
-                                      half_curvature > 0 ? base_error_m(header) : 0},
-                                     0,
-                                     0,
-                                     box_of(item.tile, header.own, views, half_curvature),
-                                     0});
-                    edges.tiles().push_back({item.tile, item.geomip, item.edge_mask, {}});
-                }
-                tiles[static_cast<std::size_t>(tile)].seen_by |= 1u << v;
-                ++tiles[static_cast<std::size_t>(tile)].views;
-            }
+    void gather(const Residency& resident, const Selection& selection) {
+        tiles = selection.tiles;
+        residency = &resident;
+        edges.link(tiles);
+        if (selection.parts.empty()) {
+            part_level_of_slot.clear();
+            return;
+        }
+        part_level_of_slot.assign(states.size(), 0);
         for (const DrawList& list : selection.parts)
             for (const DrawItem& item : list) {
-                Drawn& tile = tiles[static_cast<std::size_t>(tile_of_slot[static_cast<std::size_t>(item.height_slot)])];
-                tile.part_level = std::max(tile.part_level, item.part.level);
+                std::int32_t& level = part_level_of_slot[static_cast<std::size_t>(item.height_slot)];
+                level = std::max(level, item.part.level);
             }
+    }
+
+    const HeightTileHeader& header_of(const DrawnTile& tile) const {
+        return residency->heights.headers[static_cast<std::size_t>(tile.height_slot)];
+    }
+
+    TileShape shape_of(const DrawnTile& tile, double half_curvature) const {
+        return {tile.height_slot, tile.id, tile.geomip, tile.edge_mask,
+                half_curvature > 0 ? base_error_m(header_of(tile)) : 0};
     }
 
     float base_error_m(const HeightTileHeader& header) const {
@@ -160,56 +169,53 @@ struct PageMesher::Impl {
 
     // --- the choice of a tile's own vertices ---
 
-    // The rung of a tile: what it may err by, over the views that see it.
-    int rung_of(const Drawn& tile, std::span<const Camera> views, double tau_px) const {
-        double threshold_m = std::numeric_limits<double>::infinity();
-        for (std::size_t v = 0; v < views.size(); ++v) {
-            if ((tile.seen_by >> v & 1) == 0) continue;
-            const Camera& view = views[v];
-            const double distance_m = std::max(distance_to_box(view.eye, tile.box), view.near_m);
-            threshold_m = std::min(threshold_m, tau_px * distance_m / (view.focal_px() * view.off_axis_factor()));
-        }
-        threshold_m = std::min(threshold_m, kGreatestThreshold_m);
-        if (!(threshold_m > 0)) return kLeastRung;
-        return static_cast<int>(std::floor(kRungsPerOctave * std::log2(threshold_m)));
-    }
-    static double threshold_of(int rung) { return rung == kLeastRung ? 0 : std::exp2(rung / kRungsPerOctave); }
-
-    bool same_shape(const Chosen& c, const Drawn& tile, const MeshSettings& s) const {
-        return c.valid && c.geomip == tile.shape.geomip && c.edge_mask == tile.shape.edge_mask &&
-               c.part_level == tile.part_level && c.half_curvature == s.half_curvature;
+    // The rung of what a tile may err by.
+    Rung rung_of(double threshold_m) const {
+        if (!(threshold_m >= kLeastThreshold_m)) return {0, kLeastThreshold_m};
+        if (threshold_m >= kGreatestThreshold_m) return {kGreatestThreshold_m, std::numeric_limits<double>::infinity()};
+        int exponent = 0;
+        const double part = 2 * std::frexp(threshold_m, &exponent);  // 1 .. 2
+        std::size_t k = rungs.size() - 1;
+        while (part < rungs[k]) --k;
+        return {std::ldexp(rungs[k], exponent - 1),
+                k + 1 < rungs.size() ? std::ldexp(rungs[k + 1], exponent - 1) : std::ldexp(1, exponent)};
     }
 
-    bool may_reuse(const Chosen& c, const Drawn& tile, std::span<const Camera> views, const MeshSettings& s) const {
+    bool same_shape(const Chosen& c, const DrawnTile& tile, const MeshSettings& s) const {
+        return c.valid && c.geomip == tile.geomip && c.edge_mask == tile.edge_mask &&
+               c.part_level == part_level_of(tile) && c.half_curvature == s.half_curvature;
+    }
+
+    bool may_reuse(const Chosen& c, const DrawnTile& tile, std::span<const Camera> views, const MeshSettings& s) const {
         if (lod.reuse == ReuseTest::off || !same_shape(c, tile, s) || views.size() > kMostEyes) return false;
         if (c.tau_px != s.tau_px || (tile.seen_by & ~c.seen_by) != 0) return false;
+        const Box box = box_of(tile.id, header_of(tile).own, views, s.half_curvature);
         for (std::size_t v = 0; v < views.size(); ++v) {
             if ((tile.seen_by >> v & 1) == 0) continue;
-            if (!may_reuse(c.eyes[v], c.error_px[v], tile, views[v], s)) return false;
+            if (!may_reuse(c.eyes[v], c.error_px[v], tile, box, views[v], s)) return false;
         }
         return true;
     }
 
-    bool may_reuse(const glm::dvec3& then, double error_px, const Drawn& tile, const Camera& view,
+    bool may_reuse(const glm::dvec3& then, double error_px, const DrawnTile& tile, const Box& box, const Camera& view,
                    const MeshSettings& s) const {
         const double now_px = view.focal_px() * view.off_axis_factor();
         if (now_px > error_px) return false;
         if (lod.reuse == ReuseTest::paper)
-            return reuse_p1(then, view.eye, corners_of(tile), tile.box, view.focal_px(), lod.s_px, s.tau_px);
-        const EyeToBox before = eye_to_box(then, tile.box), after = eye_to_box(view.eye, tile.box);
+            return reuse_p1(then, view.eye, corners_of(tile, box), box, view.focal_px(), lod.s_px, s.tau_px);
+        const EyeToBox before = eye_to_box(then, box), after = eye_to_box(view.eye, box);
         double moved_m = glm::length(view.eye - then);
         // Relative to the eye, a point over a curved earth moves by more than the eye does.
         if (s.half_curvature > 0) {
-            const double furthest_m = std::max(before.level_m, after.level_m) +
-                                      std::hypot(tile.box.high.x - tile.box.low.x, tile.box.high.y - tile.box.low.y);
+            const double furthest_m =
+                std::max(before.level_m, after.level_m) + std::hypot(box.high.x - box.low.x, box.high.y - box.low.y);
             moved_m *= 1 + (2 * furthest_m + moved_m) * s.half_curvature;
         }
         return reuse_exact(before, after, moved_m, kMetricFloor, {s.tau_px, lod.s_px});
     }
 
-    std::array<glm::dvec3, 4> corners_of(const Drawn& tile) const {
-        const Box& box = tile.box;
-        const auto z = [&](int side, int k) { return vertices.height_m(tile.shape.slot, side_vertex(side, k, m)); };
+    std::array<glm::dvec3, 4> corners_of(const DrawnTile& tile, const Box& box) const {
+        const auto z = [&](int side, int k) { return vertices.height_m(tile.height_slot, side_vertex(side, k, m)); };
         return {{{box.low.x, box.high.y, z(0, 0)},
                  {box.high.x, box.high.y, z(0, m)},
                  {box.low.x, box.low.y, z(2, 0)},
@@ -217,39 +223,43 @@ struct PageMesher::Impl {
     }
 
     // Parts of a tile are drawn apart: the lines between them must be edges.
-    void add_parts(const Drawn& tile, std::uint8_t* active) const {
-        const Bisection& b = vertices.bisection(tile.shape.tile);
-        const int stride = m >> tile.part_level;
-        for (int j = 0; tile.part_level > 0 && j <= m; j += stride)
+    void add_parts(const DrawnTile& tile, std::uint8_t* active) const {
+        const Bisection& b = vertices.bisection(tile.id);
+        const int level = part_level_of(tile), stride = m >> level;
+        for (int j = 0; level > 0 && j <= m; j += stride)
             for (int i = 0; i <= m; i += stride) add_closed(b, b.index(i, j), active);
     }
 
-    void choose(const Drawn& tile, std::span<const Camera> views, const MeshSettings& s) {
+    void choose(const DrawnTile& tile, std::span<const Camera> views, const MeshSettings& s) {
         SlotState& state = state_of(tile);
         Chosen& c = state.chosen;
-        int rung = kNoRung;
+        const double threshold_m = s.tau_px * tile.metres_per_px;
         if (lod.method == LodMethod::block_rsg) {
-            rung = rung_of(tile, views, s.tau_px);
-            if (rung == c.rung && same_shape(c, tile, s)) return;
+            if (threshold_m >= c.least_m && threshold_m < c.beyond_m && same_shape(c, tile, s)) return;
         } else if (may_reuse(c, tile, views, s)) {
             return;
         }
         ++counters.chosen;
         std::uint8_t* active = chosen_of(tile);
-        if (lod.method == LodMethod::block_rsg)
-            vertices.choose(tile.shape, threshold_of(rung), s.half_curvature, active);
-        else
-            choose_each(tile, views, s, active);
-        state.whole = vertices.complete_if_dense(tile.shape, active);
+        const TileShape shape = shape_of(tile, s.half_curvature);
+        Rung rung;
+        if (lod.method == LodMethod::block_rsg) {
+            rung = rung_of(threshold_m);
+            vertices.choose(shape, rung.least_m, s.half_curvature, active);
+        } else {
+            choose_each(tile, shape, views, s, active);
+        }
+        state.whole = vertices.complete_if_dense(shape, active);
         add_parts(tile, active);
-        state.own = edges.border_of(active);
+        edges.border_of(active, own_border(tile));
         state.made = false;
         c = {true,
-             tile.shape.geomip,
-             tile.shape.edge_mask,
-             tile.part_level,
+             tile.geomip,
+             tile.edge_mask,
+             part_level_of(tile),
              tile.seen_by,
-             rung,
+             rung.least_m,
+             rung.beyond_m,
              s.tau_px,
              s.half_curvature,
              {},
@@ -260,51 +270,42 @@ struct PageMesher::Impl {
         }
     }
 
-    void choose_each(const Drawn& tile, std::span<const Camera> views, const MeshSettings& s, std::uint8_t* active) {
+    void choose_each(const DrawnTile& tile, const TileShape& shape, std::span<const Camera> views,
+                     const MeshSettings& s, std::uint8_t* active) {
         const bool paper = lod.metric == ErrorMetric::uc;
         std::array<VertexEye, kMaxViews> eyes;
         std::size_t count = 0;
         for (std::size_t v = 0; v < views.size(); ++v)
             if ((tile.seen_by >> v & 1) != 0)
                 eyes[count++] = {views[v].eye, views[v].focal_px() * (paper ? 1 : views[v].off_axis_factor())};
-        vertices.choose(tile.shape, std::span(eyes.data(), count), s.tau_px, s.half_curvature, paper, active);
+        vertices.choose(shape, std::span(eyes.data(), count), s.tau_px, s.half_curvature, paper, active);
     }
 
     // --- triangles ---
 
     // Cell by cell of its parts, in Morton order.
     void emit(std::size_t t) {
-        const Drawn& tile = tiles[t];
-        const TileBorder& border = edges.tiles()[t].border;
-        const Bisection& b = vertices.bisection(tile.shape.tile);
+        const DrawnTile& tile = tiles[t];
+        const int part_level = part_level_of(tile);
         SlotState& state = state_of(tile);
-        std::memcpy(set.data(), chosen_of(tile), set.size());
-        edges.add_border(b, border, state.own, set.data());
+        std::memcpy(set.data(), chosen_of(tile), vertices.vertex_count());
+        edges.add_border(vertices.bisection(tile.id), edges.border(t), own_border(tile), set.data());
+        const TriangleWalk& walk = walks[static_cast<std::size_t>((tile.id.x + tile.id.y) & 1)];
         std::uint32_t* out = buffer.data();
         state.cell_starts.clear();
-        for_each_cell(tile.part_level, [&](int x, int y) {
-            if (tile.part_level > 0) state.cell_starts.push_back(static_cast<std::uint32_t>(out - buffer.data()));
-            for (const BisectionTriangle& root : b.roots(n - tile.part_level, x, y))
-                out = emit_triangles(b, set.data(), root, 2 * tile.part_level + 1, out);
-        });
-        const auto count = static_cast<std::size_t>(out - buffer.data());
-        if (tile.part_level > 0) state.cell_starts.push_back(static_cast<std::uint32_t>(count));
-        state.mesh = pool.put(std::span(buffer.data(), count));
-        state.drawn = border;
+        if (part_level == 0) {
+            out = walk.emit(set.data(), 0, out);
+        } else {
+            for (int code = 0; code < 1 << (2 * part_level); ++code) {
+                state.cell_starts.push_back(static_cast<std::uint32_t>(out - buffer.data()));
+                out = walk.emit_cell(set.data(), part_level, code, out);
+            }
+            state.cell_starts.push_back(static_cast<std::uint32_t>(out - buffer.data()));
+        }
+        state.mesh = pool.put(std::span(buffer.data(), static_cast<std::size_t>(out - buffer.data())));
+        std::copy_n(edges.border(t), edges.words(), drawn_border(tile));
         state.made = true;
         ++counters.remade;
-    }
-
-    template <class Visit>
-    static void for_each_cell(int level, const Visit& visit) {
-        for (int code = 0; code < 1 << (2 * level); ++code) {
-            int x = 0, y = 0;
-            for (int bit = 0; bit < level; ++bit) {
-                x |= (code >> (2 * bit) & 1) << bit;
-                y |= (code >> (2 * bit + 1) & 1) << bit;
-            }
-            visit(x, y);
-        }
     }
 
     // False: they do not all fit.
@@ -326,7 +327,7 @@ struct PageMesher::Impl {
     bool is_made(std::size_t t) {
         const SlotState& state = state_of(tiles[t]);
         if (state.whole) return true;
-        return state.made && state.drawn == edges.tiles()[t].border && pool.holds(state.mesh);
+        return state.made && edges.same(drawn_border(tiles[t]), edges.border(t)) && pool.holds(state.mesh);
     }
 
     void hand_over(Selection& selection, double promise_px) {
@@ -342,7 +343,7 @@ struct PageMesher::Impl {
                 item.bound_px = std::max(item.bound_px, least_px);
             }
         selection.triangles = 0;
-        for (const Drawn& tile : tiles) selection.triangles += tile.views * triangles_of(tile);
+        for (const DrawnTile& tile : tiles) selection.triangles += std::popcount(tile.seen_by) * triangles_of(tile);
         counters.triangles = selection.triangles;
     }
 
@@ -351,9 +352,9 @@ struct PageMesher::Impl {
         return state.whole ? MeshRange{} : state.mesh;
     }
 
-    std::int64_t triangles_of(const Drawn& tile) const {
+    std::int64_t triangles_of(const DrawnTile& tile) const {
         const SlotState& state = state_of(tile);
-        return state.whole ? pattern_triangles(n, tile.shape.geomip, tile.shape.edge_mask) : state.mesh.count / 3;
+        return state.whole ? pattern_triangles(n, tile.geomip, tile.edge_mask) : state.mesh.count / 3;
     }
 
     // The cells of a part stand together.
@@ -370,15 +371,14 @@ struct PageMesher::Impl {
         return state.mesh.section(state.cell_starts[first], state.cell_starts[end] - state.cell_starts[first]);
     }
 
-    void mesh(std::span<const Camera> views, const MeshSettings& settings, const Residency& residency,
+    void mesh(std::span<const Camera> views, const MeshSettings& settings, const Residency& resident,
               Selection& selection) {
         counters = {};
         MeshSettings s = settings;
         // Where the budget holds the cut coarse, finer vertices within its tiles would not be seen for what they are.
         s.tau_px = std::max(s.tau_px, selection.tau_effective_px / kCutShare);
-        gather(views, s.half_curvature, residency, selection);
+        gather(resident, selection);
         counters.tiles = static_cast<std::int64_t>(tiles.size());
-        edges.link();
         const double asked_px = s.tau_px;
         bool fits = choose_and_make(views, s);
         for (int step = 0; !fits && step < kMostCoarsening; ++step) {
@@ -401,8 +401,9 @@ struct PageMesher::Impl {
     }
 
     bool choose_and_make(std::span<const Camera> views, const MeshSettings& s) {
-        for (const Drawn& tile : tiles) choose(tile, views, s);
-        for (std::size_t t = 0; t < tiles.size(); ++t) edges.tiles()[t].border = state_of(tiles[t]).own;
+        for (const DrawnTile& tile : tiles) choose(tile, views, s);
+        for (std::size_t t = 0; t < tiles.size(); ++t)
+            std::copy_n(own_border(tiles[t]), edges.words(), edges.border(t));
         edges.agree();
         return make_meshes();
     }
@@ -449,9 +450,10 @@ const MeshCounters& PageMesher::counters() const { return impl_->counters; }
 
 std::int64_t PageMesher::slot_cost(const Dataset& dataset) {
     const std::size_t vertices = slot_vertex_count(dataset.lattice.tile_cells_log2);
-    return TileVertices::slot_cost(dataset) + EdgeAgreement::slot_cost() +
+    // What was chosen and what is drawn has a border each, beside that of the frame.
+    return TileVertices::slot_cost(dataset) + 3 * EdgeAgreement::slot_cost(dataset.lattice) +
            static_cast<std::int64_t>(vertices + most_indices(dataset) / kPoolShare * kIndexBytes + sizeof(SlotState) +
-                                     sizeof(Drawn));
+                                     sizeof(DrawnTile));
 }
 
 std::int64_t PageMesher::fixed_cost(const Dataset& dataset) {

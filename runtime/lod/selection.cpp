@@ -155,10 +155,22 @@ struct Selector::Impl {
         use_standing_ = !heights_complete || residency.now_s < grown_s;
     }
 
+    // Which of the tiles drawn lie beside one another, as the cut knows it.
+    void link_tiles(Cut& cut) {
+        for (std::size_t t = 0; t < result.tiles.size(); ++t)
+            for (int d = 0; d < 4; ++d) {
+                const std::int32_t beside = cut.drawn_beside(node_of_tile_[t], d);
+                if (beside >= 0)
+                    result.tiles[t].beside[static_cast<std::size_t>(d)] =
+                        tile_of_node_[static_cast<std::size_t>(beside)];
+            }
+    }
+
     void emit(Cut& cut, const SelectionSettings& settings) {
         const int n = dataset.lattice.tile_cells_log2;
         const auto& nodes = cut.nodes();
         double weights = 0;
+        if (settings.list_tiles) tile_of_node_.assign(nodes.size(), -1);
         for (std::size_t k = 0; k < nodes.size(); ++k) {
             const CutNode& node = nodes[k];
             if (node.split || !node.visible()) continue;
@@ -184,6 +196,17 @@ struct Selector::Impl {
             const double weight = screen_share(node);
             result.mean_bound_px += weight * bound_px;
             weights += weight;
+            if (settings.list_tiles) {
+                tile_of_node_[k] = static_cast<std::int32_t>(result.tiles.size());
+                node_of_tile_.push_back(static_cast<std::int32_t>(k));
+                result.tiles.push_back({node.id,
+                                        node.slot,
+                                        item.geomip,
+                                        item.edge_mask,
+                                        shown,
+                                        cut.certain_metres_per_px(node),
+                                        {-1, -1, -1, -1}});
+            }
             const std::uint32_t triangles = pattern_triangles(n, item.geomip, item.edge_mask);
             for (std::size_t v = 0; v < views.size(); ++v) {
                 if ((shown >> v & 1) == 0) continue;
@@ -193,6 +216,7 @@ struct Selector::Impl {
                 result.triangles += triangles;
             }
         }
+        if (settings.list_tiles) link_tiles(cut);
         if (weights > 0) result.mean_bound_px /= weights;
         result.growing = cut.growing() || textures.fading();
     }
@@ -224,6 +248,8 @@ struct Selector::Impl {
         for (auto* list : {&r.planned_heights, &r.planned_textures, &r.standing_heights, &r.standing_textures})
             list->clear();
         r.requests.clear();
+        r.tiles.clear();
+        node_of_tile_.clear();
         r.max_bound_px = r.mean_bound_px = 0;
         r.complete = true;
         r.growing = r.budget_limited = false;
@@ -258,6 +284,7 @@ struct Selector::Impl {
 private:
     bool use_standing_ = false;
     bool pages_fit_ = false;
+    std::vector<std::int32_t> tile_of_node_, node_of_tile_;
 };
 
 Selector::Selector(const Dataset& dataset) : impl_(std::make_unique<Impl>(dataset)) {}

@@ -7,6 +7,7 @@
 // runtime/view/camera.h).
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -40,12 +41,28 @@ struct SelectionSettings {
     /// goes by what headers say of them. Anything else: guaranteed.
     ErrorMetric metric = ErrorMetric::guaranteed;
     Culling culling = Culling::box;  ///< corners: of the tiles to draw, those without a corner in view are left out
+    bool list_tiles = false;         ///< fill Selection::tiles
 
     friend bool operator==(const SelectionSettings&, const SelectionSettings&) = default;
 };
 
+/// A tile that is drawn in any view, for what thins it.
+struct DrawnTile {
+    TileId id;
+    std::int32_t height_slot = 0;
+    std::int32_t geomip = 0;
+    std::uint32_t edge_mask = 0;
+    std::uint32_t seen_by = 0;  ///< views that draw it
+    /// Least over those of d / (f K), d the distance to its box: an error of so many metres is seen as a pixel at most.
+    double metres_per_px = 0;
+    /// In Selection::tiles, the one beside its north, east, south and west edge where that is as large or larger, else
+    /// -1: smaller ones name it.
+    std::array<std::int32_t, 4> beside{-1, -1, -1, -1};
+};
+
 struct Selection {
-    std::vector<DrawList> draws;  ///< one list a view, an item a tile
+    std::vector<DrawList> draws;   ///< one list a view, an item a tile
+    std::vector<DrawnTile> tiles;  ///< where the settings ask for them
     /// The same for the renderer, tiles under deep textures in parts. Empty where the store has none: draw `draws`.
     std::vector<DrawList> parts;
     std::vector<TileRequest> requests;  ///< most urgent first; nothing that could not be kept

@@ -112,12 +112,12 @@ void TileVertices::add_parents(const TileShape& shape, std::uint8_t* active) con
 }
 
 // At the middle of a hypotenuse 2 l long l^2 / 2R are missed. A vertex that costs nothing leaves the surface as the
-// tile's own vertices have it: off by as much as they are.
+// tile's own vertices have it: off by as much as they are. Taken for all, that costs next to nothing, for it is within
+// the cut's share of the tolerance, and the errors stay monotone up the hierarchy.
 const float* TileVertices::curved_errors(const TileShape& shape, double half_curvature) {
     const float* error = error_.data() + at(shape.slot);
     const auto factor = static_cast<float>(spacing_m(shape.tile) * spacing_m(shape.tile) * half_curvature);
-    for (std::size_t v = 0; v < vertices_; ++v)
-        errors_[v] = (error[v] > 0 ? error[v] : shape.base_m) + factor * bulge_[v];
+    for (std::size_t v = 0; v < vertices_; ++v) errors_[v] = std::max(error[v], shape.base_m) + factor * bulge_[v];
     return errors_.data();
 }
 
@@ -158,9 +158,7 @@ void TileVertices::choose(const TileShape& shape, double threshold_m, double hal
     if (half_curvature > 0) error = curved_errors(shape, half_curvature);
     const auto threshold = static_cast<float>(threshold_m * (1 - 1e-6));
     fails_threshold(error, vertices_, threshold, active);
-    restrict_to(shape, active);
-    // Saturated errors are monotone; with what stands in for errors of 0 over a curved earth they need not be.
-    if (half_curvature > 0) add_parents(shape, active);
+    restrict_to(shape, active);  // saturated errors are monotone: parents are there
 }
 
 bool TileVertices::complete_if_dense(const TileShape& shape, std::uint8_t* active) {

@@ -299,7 +299,8 @@ SelectionSettings Scene::selection_settings(double half_curvature, double growth
             growth_s,
             moved_m_,
             options_.lod.metric,
-            options_.lod.culling};
+            options_.lod.culling,
+            meshed};
 }
 
 void Scene::note_motion(std::span<const Camera> views, double now_s) {

@@ -68,8 +68,7 @@ CameraRig::CameraRig(const FlightPose& home, double extent_m)
       extent_m_(std::isfinite(extent_m) ? std::clamp(extent_m, 1.0, 1e9) : 1000),
       fly_speed_(extent_m_ / 20),
       walk_speed_(kStrolling_m_per_s) {
-    take(home_);
-    home_.eye = eye_;
+    if (!take(home_)) home_ = pose();
 }
 
 glm::dvec3 CameraRig::forward() const {

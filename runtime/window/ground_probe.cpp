@@ -158,7 +158,6 @@ void GroundProbe::run() {
         if (stopping_) return;
         const std::size_t kind = *next_kind(work);
         work.last_kind = kind;
-        if (work.state != state_) work.profile.reset();
         work.state = state_;
         answer(kind, work, lock);
     }

@@ -8,8 +8,8 @@
 #include <cstdlib>
 #include <thread>
 
+#include "runtime/report/statistics.h"
 #include "runtime/scene/scene.h"
-#include "runtime/app/statistics.h"
 #include "runtime/view/flight_path.h"
 
 namespace scree {

@@ -158,6 +158,7 @@ protected:
                     ASSERT_TRUE(camera.ok());
                     SelectionSettings settings = test::with_tau(meshed ? kCutShare * tau : tau);
                     settings.morph = !meshed;
+                    settings.list_tiles = meshed;
                     Selection& s = selector.select({&*camera, 1}, settings, chain.residency());
                     if (meshed) mesher.mesh({&*camera, 1}, {tau, 0}, chain.residency(), s);
                     if (away > camera->near_m) {  // all that is nearer is cut off

@@ -45,6 +45,7 @@ const Selection& MeshedWorld::draw(std::span<const Camera> views, double tau_px,
     SelectionSettings settings = with_tau(mesher_ ? kCutShare * tau_px : tau_px);
     settings.half_curvature = half_curvature;
     settings.morph = mesher_ == nullptr;
+    settings.list_tiles = mesher_ != nullptr;
     drawn_ = &selector_.select(views, settings, residency_);
     if (mesher_) mesher_->mesh(views, {tau_px, half_curvature}, residency_, *drawn_);
     return *drawn_;

@@ -1,5 +1,5 @@
 // What a chart must show, read back from its SVG.
-#include "experiments/plot.h"
+#include "runtime/report/plot.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "experiments/plot.h"
+#include "runtime/report/plot.h"
 
 #include <fmt/format.h>
 
@@ -7,6 +7,8 @@
 #include <cstddef>
 #include <limits>
 #include <string_view>
+
+#include "runtime/report/html.h"
 
 namespace scree {
 namespace {
@@ -31,24 +33,6 @@ constexpr std::string_view kStyle =
     "30363d}"
     ".a,.l{stroke:#9aa4af}.c0{color:#6cb6ff}.c1{color:#ff9466}.c2{color:#5fd38d}.c3{color:#b79cff}.c4{color:#e3bf5a}"
     ".c5{color:#ff8fc0}.c6{color:#5ed1c5}.c7{color:#b5b5b5}}";
-
-std::string escaped(std::string_view text) {
-    std::string out;
-    for (const char c : text) {
-        if (c == '<') {
-            out += "&lt;";
-        } else if (c == '>') {
-            out += "&gt;";
-        } else if (c == '&') {
-            out += "&amp;";
-        } else if (c == '"') {
-            out += "&quot;";
-        } else {
-            out += c;
-        }
-    }
-    return out;
-}
 
 /// As in running text: 0.05, 1500, 2e6.
 std::string number(double value) {
