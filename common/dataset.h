@@ -63,8 +63,8 @@ struct Dataset {
     /// Longitude and latitude; none in stores without a CRS, or made before there was one.
     std::optional<GeoGrid> geo_grid{};
 
-    /// How many times as high as they are the heights above are given (SqliteStore's StoreOptions): what is in metres of
-    /// height here, divided by it, is what the ground has. Not of the store, and not written.
+    /// How many times as high as they are the heights above are given (SqliteStore's StoreOptions): what is in metres
+    /// of height here, divided by it, is what the ground has. Not of the store, and not written.
     double exaggeration = 1;
 
     int texture_size() const { return 1 << texture_size_log2; }

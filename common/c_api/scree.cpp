@@ -102,6 +102,30 @@ scree_status scree_heights(scree_store* store, const double* xy_m, size_t count,
     return SCREE_OK;
 }
 
+scree_status scree_lon_lat(scree_store* store, double x_m, double y_m, double* longitude_deg, double* latitude_deg) {
+    if (store == nullptr) return usage("scree_lon_lat: store is null");
+    return guarded([&] {
+        const auto& grid = store->store->dataset().geo_grid;
+        const auto at = grid ? grid->lon_lat(x_m, y_m) : std::nullopt;
+        if (!at) return SCREE_ABSENT;
+        if (longitude_deg != nullptr) *longitude_deg = at->longitude_deg;
+        if (latitude_deg != nullptr) *latitude_deg = at->latitude_deg;
+        return SCREE_OK;
+    });
+}
+
+scree_status scree_place(scree_store* store, double longitude_deg, double latitude_deg, double* x_m, double* y_m) {
+    if (store == nullptr) return usage("scree_place: store is null");
+    return guarded([&] {
+        const auto& grid = store->store->dataset().geo_grid;
+        const auto place = grid ? grid->place({longitude_deg, latitude_deg}) : std::nullopt;
+        if (!place) return SCREE_ABSENT;
+        if (x_m != nullptr) *x_m = (*place)[0];
+        if (y_m != nullptr) *y_m = (*place)[1];
+        return SCREE_OK;
+    });
+}
+
 const char* scree_error_message(void) { return last_message().c_str(); }
 
 const char* scree_version(void) { return SCREE_VERSION; }

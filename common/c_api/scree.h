@@ -19,7 +19,7 @@ extern "C" {
 
 /* Numbers of errors are the exit codes of the programs. */
 typedef enum scree_status {
-    SCREE_ABSENT = -1,     /* no error: there is no terrain there */
+    SCREE_ABSENT = -1,     /* no error: there is nothing there */
     SCREE_OK = 0,          /* done */
     SCREE_ERROR_USAGE = 2, /* an argument that makes no sense */
     SCREE_ERROR_INPUT = 3, /* the file is missing or cannot be read */
@@ -45,6 +45,14 @@ scree_status scree_height(scree_store* store, double x_m, double y_m, double* he
 /* The same of `count` points: xy_m holds x and y in turn; heights_m takes `count` numbers, NaN where there is no
  * terrain. Points near one another are answered fastest in a row. */
 scree_status scree_heights(scree_store* store, const double* xy_m, size_t count, double* heights_m);
+
+/* Longitude (-180..180, east positive) and latitude (geodetic), WGS 84 degrees, of (x_m, y_m), as exact as the store
+ * says ("geo_grid" of scree_info()). Either of the two may be null. SCREE_ABSENT leaves them as they are: the store
+ * knows no longitudes and latitudes (it has no CRS, or was made before stores had them), or not so far out. */
+scree_status scree_lon_lat(scree_store* store, double x_m, double y_m, double* longitude_deg, double* latitude_deg);
+
+/* The place of a longitude and latitude: the way back. SCREE_ABSENT likewise. */
+scree_status scree_place(scree_store* store, double longitude_deg, double latitude_deg, double* x_m, double* y_m);
 
 /* Why the last call on this thread that returned an error failed: for people, UTF-8, valid until the next one that
  * does. Empty where none did. */

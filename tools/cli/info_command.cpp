@@ -82,6 +82,9 @@ int run_info(int argc, char** argv) {
         fmt::print("  datum      {}\n", d.vertical_datum.empty() ? "not stated" : d.vertical_datum);
         fmt::print("  extent     x {} .. {}, y {} .. {} m\n", l.x_m(0), l.x_m(cells_x), l.y_m(cells_y), l.y_m(0));
         print_corners(corners);
+        if (d.geo_grid)
+            fmt::print("  longitudes {} x {} nodes, off by {} m at most\n", d.geo_grid->columns, d.geo_grid->rows,
+                       d.geo_grid->error_m);
         fmt::print("  lattice    {} x {} cells of {} m, {} levels, {} x {} roots\n", l.cells_x, l.cells_y, l.spacing_m,
                    l.deepest_level + 1, l.root_rows, l.root_columns);
         fmt::print("  heights    {} .. {} m in steps of {} m (error {} m), {} tiles of {}^2\n", d.min_height_m,
@@ -114,6 +117,11 @@ int run_info(int argc, char** argv) {
                            {"fingerprint", s.fingerprint}});
     nlohmann::ordered_json corners_deg = nlohmann::ordered_json::array();
     for (const Corner& c : corners) corners_deg.push_back({c.longitude_deg, c.latitude_deg});
+    nlohmann::ordered_json geo_grid = nullptr;
+    if (d.geo_grid)
+        geo_grid = {{"nodes", {d.geo_grid->columns, d.geo_grid->rows}},
+                    {"box_m", d.geo_grid->box_m},
+                    {"error_m", d.geo_grid->error_m}};
     const nlohmann::ordered_json out = {
         {"format_version", kFormatVersion},
         {"crs", d.crs},
@@ -121,6 +129,7 @@ int run_info(int argc, char** argv) {
         {"vertical_datum", d.vertical_datum},
         {"origin_m", {l.origin_x_m, l.origin_y_m}},
         {"corners_deg", corners_deg},
+        {"geo_grid", geo_grid},
         {"spacing_m", l.spacing_m},
         {"cells", {l.cells_x, l.cells_y}},
         {"present_cells", d.present_cells},

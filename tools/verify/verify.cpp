@@ -54,6 +54,14 @@ Result<void> check_tiles(const SqliteStore& store, const VerifyOptions& options,
     return {};
 }
 
+GeoCheck check_lon_lat(const Dataset& d, ProblemList& problems) {
+    GeoCheck check = check_geo_grid(d);
+    if (check.broken)
+        problems.add(fmt::format("dataset: longitudes and latitudes are off by {:.4f} m, {} m are stated",
+                                 *check.error_m, d.geo_grid->error_m));
+    return check;
+}
+
 }  // namespace
 
 Result<VerifyReport> verify_store(const std::string& path, const VerifyOptions& options) {
@@ -61,6 +69,7 @@ Result<VerifyReport> verify_store(const std::string& path, const VerifyOptions& 
     if (!store) return store.error();
     VerifyReport report;
     ProblemList problems;
+    report.lon_lat = check_lon_lat((*store)->dataset(), problems);
     auto readable = check_layout(path, problems);
     if (!readable) return readable.error();
     if (options.progress) options.progress(kLayoutShare);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/result.h"
+#include "tools/verify/geo_check.h"
 
 namespace scree {
 
@@ -25,6 +26,7 @@ struct VerifyReport {
     std::int64_t shared_samples_differing = 0;
     std::int64_t bounds_checked = 0;  ///< certified errors compared with the truth
     std::int64_t bound_violations = 0;
+    GeoCheck lon_lat;                   ///< what is wrong with it is among the problems
     std::vector<std::string> problems;  ///< at most 100 and one line that counts the rest
 
     bool sound() const { return shared_samples_differing == 0 && bound_violations == 0 && problems.empty(); }

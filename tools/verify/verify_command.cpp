@@ -34,12 +34,15 @@ private:
 };
 
 std::string to_json(const VerifyReport& report) {
-    const nlohmann::ordered_json json = {{"tiles_checked", report.tiles_checked},
-                                         {"shared_samples_compared", report.shared_samples_compared},
-                                         {"shared_samples_differing", report.shared_samples_differing},
-                                         {"bounds_checked", report.bounds_checked},
-                                         {"bound_violations", report.bound_violations},
-                                         {"problems", report.problems}};
+    nlohmann::ordered_json json = {{"tiles_checked", report.tiles_checked},
+                                   {"shared_samples_compared", report.shared_samples_compared},
+                                   {"shared_samples_differing", report.shared_samples_differing},
+                                   {"bounds_checked", report.bounds_checked},
+                                   {"bound_violations", report.bound_violations},
+                                   {"lon_lat_error_m", nullptr},
+                                   {"lon_lat_note", report.lon_lat.reason},
+                                   {"problems", report.problems}};
+    if (report.lon_lat.error_m) json["lon_lat_error_m"] = *report.lon_lat.error_m;
     return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
@@ -51,6 +54,12 @@ void print_summary(std::FILE* out, const std::string& path, const VerifyReport& 
                report.shared_samples_differing);
     fmt::print(out, "  certified errors   {} checked, {} below the truth\n", report.bounds_checked,
                report.bound_violations);
+    const auto& [error_m, reason, broken] = report.lon_lat;
+    if (error_m)
+        fmt::print(out, "  longitudes         off by {:.4f} m at most{}{}\n", *error_m, reason.empty() ? "" : "; ",
+                   reason);
+    else
+        fmt::print(out, "  longitudes         not checked: {}\n", reason);
 }
 
 }  // namespace

@@ -77,6 +77,36 @@ int check_info(const char* path, const char* expected_json) {
     return failures;
 }
 
+int check_places(const char* path, double x_m, double y_m, double longitude_deg, double latitude_deg) {
+    scree_store* store = NULL;
+    double longitude = -7, latitude = -8, x = -9, y = -10;
+    failures = 0;
+    CHECK(scree_open(path, &store) == SCREE_OK);
+    if (store == NULL) return failures;
+    if (isnan(longitude_deg)) {
+        CHECK(scree_lon_lat(store, x_m, y_m, &longitude, &latitude) == SCREE_ABSENT);
+        CHECK(scree_place(store, 0, 0, &x, &y) == SCREE_ABSENT);
+    } else {
+        CHECK(scree_lon_lat(store, x_m, y_m, NULL, NULL) == SCREE_OK);
+        CHECK(scree_lon_lat(store, x_m + 1e9, y_m, &longitude, &latitude) == SCREE_ABSENT);
+        CHECK(scree_lon_lat(store, NAN, y_m, &longitude, &latitude) == SCREE_ABSENT);
+        CHECK(scree_place(store, longitude_deg + 90, latitude_deg, &x, &y) == SCREE_ABSENT);
+        CHECK(scree_place(store, longitude_deg, 91, &x, &y) == SCREE_ABSENT);
+    }
+    CHECK(longitude == -7 && latitude == -8 && x == -9 && y == -10);
+    if (!isnan(longitude_deg)) {
+        CHECK(scree_lon_lat(store, x_m, y_m, &longitude, &latitude) == SCREE_OK);
+        CHECK(longitude == longitude_deg && latitude == latitude_deg);
+        CHECK(scree_place(store, longitude_deg, latitude_deg, NULL, NULL) == SCREE_OK);
+        CHECK(scree_place(store, longitude_deg, latitude_deg, &x, &y) == SCREE_OK);
+        CHECK(fabs(x - x_m) < 1e-4 && fabs(y - y_m) < 1e-4);
+    }
+    CHECK(scree_lon_lat(NULL, 0, 0, &longitude, &latitude) == SCREE_ERROR_USAGE);
+    CHECK(scree_place(NULL, 0, 0, &x, &y) == SCREE_ERROR_USAGE);
+    scree_close(store);
+    return failures;
+}
+
 static void check_refused(const char* path, scree_status expected) {
     scree_store* store = (scree_store*)&failures;
     CHECK(scree_open(path, &store) == expected);

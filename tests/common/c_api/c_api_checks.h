@@ -14,6 +14,8 @@ struct c_api_point {
 /* Each returns how many things were wrong, and says which on standard error. */
 int check_heights(const char* store, const struct c_api_point* points, int count);
 int check_info(const char* store, const char* expected_json);
+/* Longitude and latitude of the first point, NaN where the store has none; and beyond its box. */
+int check_places(const char* store, double x_m, double y_m, double longitude_deg, double latitude_deg);
 int check_errors(const char* missing, const char* not_a_store, const char* damaged);
 
 #ifdef __cplusplus

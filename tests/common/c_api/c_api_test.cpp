@@ -14,7 +14,7 @@
 namespace scree {
 namespace {
 
-void write_store(const test::SmallWorld& world, const std::string& path) {
+void write_store(const test::SmallWorld& world, const std::string& path, const std::optional<GeoGrid>& grid = {}) {
     auto writer = SqliteStoreWriter::create(path);
     ASSERT_TRUE(writer.ok()) << writer.error().message;
     for (const auto& [id, tile] : world.tiles())
@@ -25,6 +25,7 @@ void write_store(const test::SmallWorld& world, const std::string& path) {
     Dataset dataset = world.dataset();  // what it says of textures nobody asks
     dataset.height_tiles = static_cast<std::int64_t>(world.tiles().size());
     dataset.texture_tiles = dataset.present_cells = 1;
+    dataset.geo_grid = grid;
     ASSERT_TRUE((*writer)->finish(dataset).ok());
 }
 
@@ -58,6 +59,30 @@ TEST(CApi, SaysTheHeightsAndTheDatasetOfTheStore) {
     }
     EXPECT_GT(present, 400);
     EXPECT_GT(absent, 100);
+}
+
+TEST(CApi, SaysWhereAPlaceIsOnTheEarthAndWhereAPlaceOnTheEarthIs) {
+    test::TemporaryFolder folder;
+    const test::SmallWorld world({}, [](std::int64_t i, std::int64_t j) { return static_cast<std::int32_t>(i + j); });
+    const std::string with = folder.file("with.scree"), without = folder.file("without.scree");
+    GeoGrid grid;
+    grid.columns = grid.rows = 2;
+    const Lattice& l = world.lattice();
+    const double east = l.x_m(static_cast<double>(l.cells_x)), south = l.y_m(static_cast<double>(l.cells_y));
+    grid.box_m = {l.origin_x_m, south, east, l.origin_y_m};
+    for (const LonLat& at : {LonLat{8, 47}, LonLat{8.01, 47}, LonLat{8, 46.99}, LonLat{8.01, 46.99}})
+        grid.normals.push_back(normal_of(at));
+    grid.normals = *normals_from_text(normals_to_text(grid), 2, 2);
+    write_store(world, with, grid);
+    write_store(world, without);
+    const double x = 0.7 * l.origin_x_m + 0.3 * east, y = 0.7 * l.origin_y_m + 0.3 * south;
+    const auto at = grid.lon_lat(x, y);
+    ASSERT_TRUE(at);
+    EXPECT_NEAR(at->longitude_deg, 8.003, 1e-5);
+    EXPECT_NEAR(at->latitude_deg, 46.997, 1e-5);
+    EXPECT_EQ(check_places(with.c_str(), x, y, at->longitude_deg, at->latitude_deg), 0);
+    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_EQ(check_places(without.c_str(), x, y, kNone, kNone), 0);
 }
 
 TEST(CApi, SaysWhatIsWrong) {
