@@ -35,10 +35,4 @@ Result<void> fly_blocks(const ViewOptions& options, const TileStore& store, cons
 /// Was every promise kept? Nothing is judged where none is made.
 Result<bool> audit_blocks(const ViewOptions& options, const TileStore& store, const FlightPath& path);
 
-struct BlockWindow {
-    double seconds = 0;  ///< 0: until it is closed
-    double fps = 0, tau_most_px = 16;
-};
-Result<void> view_blocks(ViewOptions options, std::shared_ptr<const SqliteStore> store, const BlockWindow& window);
-
 }  // namespace scree

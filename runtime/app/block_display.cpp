@@ -95,6 +95,19 @@ Result<void> BlockDisplay::warm_up() {
     return {};
 }
 
+Result<void> BlockDisplay::change_to(const BlockScene& scene) {
+    scene_ = &scene;
+    renderer_.reset();  // never the memory of two
+    auto renderer = make_renderer(scene);
+    if (!renderer) return renderer.error();
+    renderer_ = std::move(*renderer);
+    const FrameSettings fresh = scenery(scene.dataset());
+    settings_.haze_distance_m = fresh.haze_distance_m;
+    settings_.haze_scale_height_m = fresh.haze_scale_height_m;
+    settings_.ground_height_m = fresh.ground_height_m;
+    return {};
+}
+
 Result<void> BlockDisplay::resize(int width_px, int height_px) {
     auto target = RenderTarget::create({width_px, height_px, 0});
     if (!target) return target.error();
@@ -103,7 +116,7 @@ Result<void> BlockDisplay::resize(int width_px, int height_px) {
 }
 
 Result<FrameTimes> BlockDisplay::draw(const Camera& camera) {
-    return renderer_->draw(camera, scene_.pieces(), settings_, *target_);
+    return renderer_->draw(camera, scene_->pieces(), settings_, *target_);
 }
 
 void BlockDisplay::show() {

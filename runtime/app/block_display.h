@@ -18,16 +18,19 @@ public:
     GlContext& context() { return *context_; }
     RenderTarget& target() { return *target_; }
     FrameSettings& frame_settings() { return settings_; }
+    /// Lets go of one scene for another, in the same context. Settings stay, but for those that go by its heights.
+    /// After an error nothing can be drawn.
+    Result<void> change_to(const BlockScene& scene);
     Result<void> resize(int width_px, int height_px);
     /// What the scene has last selected.
     Result<FrameTimes> draw(const Camera& camera);
     void show();  ///< in the window, where there is one
 
 private:
-    explicit BlockDisplay(const BlockScene& scene) : scene_(scene) {}
+    explicit BlockDisplay(const BlockScene& scene) : scene_(&scene) {}
     Result<void> warm_up();
 
-    const BlockScene& scene_;
+    const BlockScene* scene_;
     std::unique_ptr<GlContext> context_;  // goes last
     std::unique_ptr<SurfaceRenderer> renderer_;
     std::unique_ptr<RenderTarget> target_;

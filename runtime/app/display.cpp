@@ -23,6 +23,16 @@ Result<std::unique_ptr<Display>> Display::create(const Scene& scene, const Displ
     return display;
 }
 
+Result<void> Display::change_to(const Scene& scene) {
+    const FrameSettings settings = terrain_->settings();
+    terrain_.reset();  // never the memory of two
+    auto terrain = SceneRenderer::create(scene, {samples_});
+    if (!terrain) return terrain.error();
+    terrain_ = std::move(*terrain);
+    terrain_->settings() = settings;
+    return {};
+}
+
 Result<void> Display::renew(const Dataset& d, const MemoryPlan& plan) {
     if (arena_ && !terrain_->fits(d, plan)) arena_ = std::make_unique<CpuArena>(d, plan.height_slots);
     return terrain_->renew(d, plan);

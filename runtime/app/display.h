@@ -24,6 +24,9 @@ class Display final : public TileSink {
 public:
     static Result<std::unique_ptr<Display>> create(const Scene& scene, const DisplayOptions& options);
 
+    /// Lets go of all tiles and makes room for those of another scene, in the same context. Settings stay. After an
+    /// error nothing can be drawn.
+    Result<void> change_to(const Scene& scene);
     Result<void> renew(const Dataset& dataset, const MemoryPlan& plan) override;
     void put_height(std::int32_t slot, std::span<const SlotVertex> vertices) override;
     void put_texture(std::int32_t slot, std::span<const std::uint8_t> chain) override;
@@ -37,6 +40,7 @@ public:
     FrameSettings& frame_settings() { return terrain_->settings(); }
     Result<void> resize(int width_px, int height_px);
     /// A second picture of the same tiles, in a target of its own.
+    bool has_inset() const { return inset_ != nullptr; }
     RenderTarget& inset() { return *inset_; }
     Result<void> resize_inset(int width_px, int height_px);
     FrameTimes draw_inset(const Camera& camera, const DrawList& draws, double half_curvature);

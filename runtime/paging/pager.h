@@ -113,6 +113,14 @@ public:
     std::int64_t slots_in_use(TileKind kind) const { return shown_->of(kind).in_use() + coming_->of(kind).in_use(); }
     const PagerCounters& counters() const { return counters_; }
     LoaderCounters loader_counters(TileKind kind) const { return loader_->counters(kind); }
+    /// Tiles of the state that is shown.
+    struct Occupancy {
+        std::int64_t resident = 0, loading = 0;
+    };
+    Occupancy occupancy(TileKind kind) const {
+        const TileCache& tiles = shown_->of(kind);
+        return {tiles.resident(), tiles.loading()};
+    }
     std::int64_t height_slots() const { return shown_->heights.capacity(); }
     std::int64_t texture_slots() const { return shown_->textures.capacity(); }
     /// Called once for each damaged tile.

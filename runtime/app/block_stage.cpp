@@ -1,0 +1,100 @@
+#include "runtime/app/block_stage.h"
+
+#include <fmt/format.h>
+
+#include "runtime/app/hud_text.h"
+#include "runtime/app/stage_lines.h"
+
+namespace scree {
+namespace {
+
+constexpr Rgba kAnew{255, 190, 60, 255}, kReused{120, 200, 255, 255};
+
+}  // namespace
+
+Result<std::unique_ptr<Stage>> BlockStage::create(const ViewOptions& o, std::shared_ptr<const SqliteStore> store) {
+    std::unique_ptr<BlockStage> stage(new BlockStage(o, std::move(store)));
+    auto scene = BlockScene::open(*stage->store_, scene_options(o));
+    if (!scene) return scene.error();
+    stage->scene_ = std::move(*scene);
+    DisplayOptions display_options{o.width_px, o.height_px};
+    display_options.window = true;
+    display_options.wait_for_refresh = true;
+    auto display = BlockDisplay::create(*stage->scene_, display_options);
+    if (!display) return display.error();
+    stage->display_ = std::move(*display);
+    return std::unique_ptr<Stage>(std::move(stage));
+}
+
+// All of it is in memory: nothing changes by itself.
+StageFrame BlockStage::choose(std::span<const Camera> views, double, double) {
+    frame_ = scene_->select(views[0]);
+    StageFrame chosen;
+    chosen.changed = first_;
+    first_ = false;
+    return chosen;
+}
+
+Result<void> BlockStage::draw(const Camera& camera) {
+    if (auto times = display_->draw(camera); !times) return times.error();
+    return {};
+}
+
+std::vector<LineSegment> BlockStage::boxes() const {
+    std::vector<LineSegment> lines;
+    for (const std::int32_t block : frame_.blocks)
+        add_box(scene_->world().box(block), scene_->world().was_reused(block) ? kReused : kAnew, lines);
+    return lines;
+}
+
+void BlockStage::describe(HudModel& model) const {
+    const auto promise_px = scene_->promise_px();
+    model.picture.push_back({"drawn", fmt::format("{} triangles in {} blocks, {} strips", grouped(frame_.triangles()),
+                                                  frame_.blocks.size(), frame_.strips.size())});
+    model.picture.push_back({"error", promise_px
+                                          ? fmt::format("within {:.2f} px, tau {:.2f}", *promise_px, scene_->tau_px())
+                                          : fmt::format("not promised, tau {:.2f}", scene_->tau_px())});
+    model.picture.push_back({"method", command_line_of(options_.lod).substr(6)});
+    model.picture.push_back({"blocks", fmt::format("{} reused, {} meshes made", frame_.reused, frame_.meshes_made)});
+    const std::int64_t held = scene_->resident_bytes();
+    model.memory.push_back({"memory",
+                            fmt::format("{} of {} MB, all of it", megabytes(held), megabytes(options_.budget_bytes)),
+                            static_cast<double>(held) / static_cast<double>(options_.budget_bytes)});
+}
+
+StageFacts BlockStage::facts() const {
+    return {std::string(to_string(options_.lod.method)), dataset().exaggeration, scene_->tau_px(), frame_.triangles(),
+            0};
+}
+
+std::optional<std::string> BlockStage::refusal(Action action) const {
+    switch (action) {
+        case Action::colour_by_level:
+        case Action::colour_by_geomip:
+        case Action::colour_by_error:
+            return "Blocks (--cracks dike) have no levels to colour by.";
+        case Action::second_view:
+            return "Blocks (--cracks dike) are chosen for one view alone.";
+        case Action::next_method:
+            return "Blocks (--cracks dike) are one method: start without them to change it.";
+        default:
+            return std::nullopt;
+    }
+}
+
+Result<std::string> BlockStage::exaggerate(double factor) {
+    const auto stay = [](const Error& error) { return fmt::format("Heights stay as they are: {}", error.message); };
+    auto store = SqliteStore::open(store_->path(), {factor});
+    if (!store) return stay(store.error());
+    SceneOptions options = scene_options(options_);
+    options.tau_px = scene_->tau_px();
+    auto scene = BlockScene::open(**store, options);
+    if (!scene) return stay(scene.error());
+    if (auto ok = display_->change_to(**scene); !ok) return ok.error();
+    store_ = std::move(*store);
+    scene_ = std::move(*scene);
+    first_ = true;
+    return fmt::format("Heights x {:g}", factor);
+}
+
+}  // namespace scree
