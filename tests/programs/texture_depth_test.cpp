@@ -54,6 +54,15 @@ protected:
         write_heights(folder_.file("dem.tif"), grid, {}, "-9999");
         return folder_.file("dem.tif");
     }
+    // Heights of 2.5 m within those of dem(), with holes of their own.
+    std::string fine_dem(std::uint64_t seed) {
+        HeightGrid grid = hills(90, 80, seed);
+        for (int j = 0; j < 80; ++j)
+            for (int i = 0; i < 90; ++i)
+                if ((i * 3 + j * 7) % 41 == 0) grid.at(i, j) = -9999;
+        write_heights(folder_.file("fine_dem.tif"), grid, {kWest + 210, kNorth - 90, 2.5}, "-9999");
+        return folder_.file("fine_dem.tif");
+    }
     // `x`, `y`: of its north-west corner, metres from the land's.
     std::string image(const std::string& name, int width, int height, double x, double y, double step, int shade,
                       int channels = 3) {
@@ -255,12 +264,13 @@ TEST_F(RandomTextureDepths, ThreadsMemoryAndInterruptionsDoNotShow) {
     for (int round = 0; round < 6 && !HasFailure(); ++round) {
         SCOPED_TRACE("round " + std::to_string(round));
         RandomMosaic mosaic(round, random);
-        List inputs{dem(uniform(random, 60, 140), uniform(random, 60, 110), static_cast<std::uint64_t>(round)),
-                    "--tile-size",
-                    std::vector<std::string>{"9", "17", "33"}[static_cast<std::size_t>(round % 3)],
-                    "--texture-size",
-                    round % 2 == 0 ? "16" : "32",
-                    "--imagery"};
+        List inputs{dem(uniform(random, 60, 140), uniform(random, 60, 110), static_cast<std::uint64_t>(round))};
+        if (uniform(random, 0, 1) == 1) inputs.push_back(fine_dem(static_cast<std::uint64_t>(round)));
+        const char* const cells[] = {"9", "129", "33", "257"};
+        inputs = inputs + List{"--fill",         "none",
+                               "--tile-size",    cells[uniform(random, 0, 3)],
+                               "--texture-size", round % 2 == 0 ? "16" : "32",
+                               "--imagery"};
         if (round % 4 != 3) inputs.push_back(image("base" + std::to_string(round) + ".tif", 150, 120, 0, 0, 10, 7));
         for (int k = uniform(random, 1, 5); k > 0; --k) inputs.push_back(mosaic.next(*this));
         build_store_from(inputs + List{"--force", "--threads", "1"}, whole_);
@@ -304,7 +314,8 @@ TEST_F(RandomTextureDepths, UpdatesEndInTheStoreOfABuild) {
         SCOPED_TRACE("round " + std::to_string(round));
         RandomMosaic mosaic(round, random);
         const List size{"--texture-size", "16", "--tile-size", round % 2 == 0 ? "33" : "9"};
-        const List land{dem(uniform(random, 60, 140), uniform(random, 60, 110), static_cast<std::uint64_t>(round))};
+        List land{dem(uniform(random, 60, 140), uniform(random, 60, 110), static_cast<std::uint64_t>(round))};
+        if (round == 1) land.push_back(fine_dem(static_cast<std::uint64_t>(round)));
         List images{image("base" + std::to_string(round) + ".tif", 150, 120, 0, 0, 10, 7)};
         images.push_back(mosaic.next(*this));
         build_store_from(land + size + List{"--force", "--imagery"} + images, store_);

@@ -56,7 +56,9 @@ std::int64_t TextureDepth::rows(int level) const {
 }
 
 void TextureDepth::mark(double west, double north, double east, double south, int level) {
-    if (level <= least_) return;
+    if (level <= least_ || west >= static_cast<double>(lattice_.cells_x) ||
+        north >= static_cast<double>(lattice_.cells_y))
+        return;
     const double slack = kTexelSlack * std::ldexp(extent(level), -size_log2_), side = extent(level - 1);
     const auto clip = [](double v, std::int64_t count) {
         return static_cast<std::int64_t>(std::clamp(v, 0.0, static_cast<double>(count)));
