@@ -248,4 +248,11 @@ std::optional<HeightMarks> height_marks(std::span<const std::uint8_t> payload) {
     return HeightMarks{static_cast<std::uint8_t>(payload[0] & 15), (payload[1] & kHasPresence) != 0};
 }
 
+bool set_texture_ends(std::span<std::uint8_t> payload, bool own, std::uint8_t children) {
+    if (payload.size() < 2) return false;
+    const unsigned stored = payload[0] & 15u, presence = payload[1] & kHasPresence;
+    payload[1] = static_cast<std::uint8_t>(presence | (own ? kTextureEnds : 0u) | (children & stored) << 4);
+    return true;
+}
+
 }  // namespace scree

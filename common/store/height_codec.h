@@ -33,4 +33,8 @@ struct HeightMarks {
 };
 std::optional<HeightMarks> height_marks(std::span<const std::uint8_t> payload);
 
+/// Says in a payload, of any codec, where textures end: at the tile itself, and at its children (bit q: child q; those
+/// that are not stored are left out). False: it is too short to be a payload.
+bool set_texture_ends(std::span<std::uint8_t> payload, bool own, std::uint8_t children);
+
 }  // namespace scree

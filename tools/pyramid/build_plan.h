@@ -12,6 +12,7 @@
 #include "common/result.h"
 #include "tools/mosaic/mosaic_plan.h"
 #include "tools/pyramid/bc1_encoder.h"
+#include "tools/pyramid/texture_depth.h"
 #include "tools/pyramid/void_fill.h"
 
 namespace scree {
@@ -53,6 +54,9 @@ struct BuildPlan {
     bool integer_heights = false;           ///< every height is an integer of the file's, nothing is resampled
     bool wide_heights = false;              ///< values do not fit float32
     Dataset dataset;                        ///< lattice, CRS, texture depth; heights still unknown
+    TextureDepth textures;                  ///< which of their tiles are refined
+    std::vector<int> image_level;           ///< of each image: the texture level that it asks for
+    std::int64_t deep_texels_wide = 0;      ///< where textures go deeper, so many are made side by side
     std::int64_t memory_bytes = 0;          ///< estimate of the peak
     std::int64_t temporary_bytes = 0;       ///< disk, during the build
     std::int64_t store_bytes_estimate = 0;  ///< an upper figure

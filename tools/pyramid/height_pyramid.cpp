@@ -511,6 +511,7 @@ private:
     // Any thread.
     Result<void> put(TileId id, std::vector<std::uint8_t> payload) {
         ++tile_count_;
+        if (job_.textures != nullptr) say_where_textures_end(payload, id, *job_.textures);
         if (job_.index != nullptr) job_.index->note(id, payload);
         return job_.writer->put(TileKind::height, *tile_key(lattice_, id), static_cast<int>(HeightCodec::plane),
                                 std::move(payload));
@@ -534,6 +535,13 @@ private:
 };
 
 }  // namespace
+
+void say_where_textures_end(std::span<std::uint8_t> payload, TileId id, const TextureDepth& textures) {
+    std::uint8_t children = 0;
+    for (int q = 0; q < 4; ++q)
+        if (textures.ends(child_of(id, q))) children = static_cast<std::uint8_t>(children | 1 << q);
+    set_texture_ends(payload, textures.ends(id), children);
+}
 
 std::int64_t height_pyramid_bytes(const Lattice& lattice) {
     const std::int64_t m = lattice.tile_cells();
