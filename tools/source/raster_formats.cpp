@@ -4,6 +4,7 @@
 #include <array>
 #include <cctype>
 #include <filesystem>
+#include <utility>
 
 #include "tools/source/tiff_file.h"
 
@@ -46,17 +47,18 @@ bool is_of(const GridFormat& format, const std::string& path, std::string_view s
            header_beside(path).has_value();
 }
 
-bool begins_so(const GridFormat& format, const std::string& path) {
+// Empty for a file that cannot be read.
+std::string start_of(const std::string& path) {
     const Result<ByteFile> file = ByteFile::open(path);
-    if (!file) return false;
-    const Result<std::string> start = file->head(kSniffBytes);
-    return start && format.begins_so(*start);
+    if (!file) return {};
+    Result<std::string> start = file->head(kSniffBytes);
+    return start ? std::move(*start) : std::string();
 }
 
 bool is_grid_in_folder(const GridFormat& format, const std::string& path) {
     const std::string extension = extension_of(path);
     if (holds(format.extensions, extension)) return true;
-    if (holds(format.shared_extensions, extension)) return begins_so(format, path);
+    if (holds(format.shared_extensions, extension)) return format.begins_so(start_of(path));
     return holds(format.headered_extensions, extension) && header_beside(path).has_value();
 }
 
@@ -94,6 +96,11 @@ const GridFormat* grid_format_of(const std::string& path, std::string_view start
     for (const GridFormat& format : grid_formats())
         if (is_of(format, path, start)) return &format;
     return nullptr;
+}
+
+const GridFormat* grid_format_of(const std::string& path) {
+    const std::string start = start_of(path);
+    return start.empty() ? nullptr : grid_format_of(path, start);
 }
 
 std::span<const ImageFormat> image_formats() {

@@ -35,6 +35,8 @@ std::span<const GridFormat> grid_formats();
 
 /// nullptr for a file of none of them; `start` is its beginning, kSniffBytes of it or all.
 const GridFormat* grid_format_of(const std::string& path, std::string_view start);
+/// The same of a file as it lies there; nullptr for one that cannot be read, too.
+const GridFormat* grid_format_of(const std::string& path);
 
 /// Images, which are decoded apart: TIFFs by libtiff, all others by OpenImageIO.
 struct ImageFormat {
