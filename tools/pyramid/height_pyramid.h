@@ -8,6 +8,7 @@
 #include <functional>
 
 #include "common/dataset.h"
+#include "common/store/height_codec.h"
 #include "tools/pyramid/deep_branch.h"
 #include "tools/pyramid/height_index.h"
 #include "tools/pyramid/height_quantizer.h"
@@ -27,6 +28,7 @@ struct HeightPyramidJob {
     const DeepTree* deep_tree = nullptr;
     const DeepHeights* deep_heights = nullptr;
     Lattice finest{};
+    HeightCodec codec = HeightCodec::plane;
     HeightIndex* index = nullptr;  ///< notes every tile; null: nobody wants to know
 };
 
@@ -39,7 +41,7 @@ struct HeightPyramidResult {
 };
 
 /// Bytes that build_height_pyramid holds.
-std::int64_t height_pyramid_bytes(const Lattice& lattice);
+std::int64_t height_pyramid_bytes(const Lattice& lattice, HeightCodec codec);
 
 Result<HeightPyramidResult> build_height_pyramid(const HeightPyramidJob& job);
 
