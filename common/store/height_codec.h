@@ -16,7 +16,17 @@ enum class HeightCodec : int {
     plane = 1  ///< plane predictor, zigzag, byte planes, Zstandard
 };
 
-/// `tile.samples` must hold (2^n + 1)^2 values within kMaxHeightUnits (asserted: the builder made them).
+struct NamedHeightCodec {
+    HeightCodec codec;
+    const char* name;    ///< as `scree build --height-codec` takes it
+    int bytes_a_sample;  ///< what terrain stays below, for estimates
+};
+/// All of them by number, read from the one table (height_codec.cpp). What is to hold for each goes through this.
+std::span<const NamedHeightCodec> height_codecs();
+inline const NamedHeightCodec& named(HeightCodec codec) { return height_codecs()[static_cast<std::size_t>(codec)]; }
+
+/// `codec` must be one of height_codecs(), `tile.samples` must hold (2^n + 1)^2 values within kMaxHeightUnits
+/// (asserted: the builder made them).
 std::vector<std::uint8_t> encode_height_tile(const HeightTile& tile, int tile_cells_log2, HeightCodec codec);
 
 /// Errors: ErrorCode::store for any payload that is not exactly one well-formed tile: truncated, too long, counts or

@@ -151,7 +151,7 @@ void plan_resources(const BuildOptions& o, BuildPlan& plan) {
     const MosaicPlan& m = plan.mosaic;
     const Lattice base = m.base_lattice();
     const std::int64_t width = base.cells_x + 1, rows = base.cells_y + 1;
-    std::int64_t heights = height_pyramid_bytes(base) + width * 32 * 8;
+    std::int64_t heights = height_pyramid_bytes(base, o.height_codec) + width * 32 * 8;
     if (plan.heights_in_place)
         heights += 2 * m.heights.front().info.unit_bytes;
     else
@@ -187,7 +187,7 @@ void plan_resources(const BuildOptions& o, BuildPlan& plan) {
     }
     const double samples = base.tile_samples() * base.tile_samples();
     plan.store_bytes_estimate =
-        static_cast<std::int64_t>(height_tiles * (samples * 2 + 200) +
+        static_cast<std::int64_t>(height_tiles * (samples * named(o.height_codec).bytes_a_sample + 200) +
                                   texture_tiles * static_cast<double>(bc1_chain_bytes(d.texture_size_log2)) * 1.02);
 }
 

@@ -10,6 +10,7 @@
 
 #include "common/dataset.h"
 #include "common/result.h"
+#include "common/store/height_codec.h"
 #include "tools/mosaic/mosaic_plan.h"
 #include "tools/pyramid/bc1_encoder.h"
 #include "tools/pyramid/texture_depth.h"
@@ -19,6 +20,7 @@ namespace scree {
 
 inline constexpr std::int64_t kMinMemoryBytes = std::int64_t{192} << 20;
 
+/// What bears on the bytes of a store must stand in the table of build_record.cpp, too: resuming and updates go by it.
 struct BuildOptions : HeightReading {
     std::vector<std::string> dems;    ///< files and folders; later ones lie on top
     std::vector<std::string> images;  ///< the same; none: a tint made from the heights
@@ -30,6 +32,7 @@ struct BuildOptions : HeightReading {
     ColourReading colours;
     FillRule fill;  ///< of interior voids; a value in metres
     std::optional<double> height_quantum_m;
+    HeightCodec height_codec = HeightCodec::plane;
     int tile_size = 33;
     int texture_size = 256;
     TextureQuality texture_quality = TextureQuality::normal;  ///< high: DXT1 takes ten to twenty times as long

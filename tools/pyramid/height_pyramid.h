@@ -9,6 +9,7 @@
 #include <span>
 
 #include "common/dataset.h"
+#include "common/store/height_codec.h"
 #include "tools/pyramid/deep_branch.h"
 #include "tools/pyramid/height_index.h"
 #include "tools/pyramid/height_quantizer.h"
@@ -29,6 +30,7 @@ struct HeightPyramidJob {
     const DeepTree* deep_tree = nullptr;
     const DeepHeights* deep_heights = nullptr;
     Lattice finest{};
+    HeightCodec codec = HeightCodec::plane;
     const TextureDepth* textures = nullptr;  ///< tiles say where these end. Null: of no consequence
     HeightIndex* index = nullptr;            ///< notes every tile; null: nobody wants to know
 };
@@ -42,7 +44,7 @@ struct HeightPyramidResult {
 };
 
 /// Bytes that build_height_pyramid holds.
-std::int64_t height_pyramid_bytes(const Lattice& lattice);
+std::int64_t height_pyramid_bytes(const Lattice& lattice, HeightCodec codec);
 
 Result<HeightPyramidResult> build_height_pyramid(const HeightPyramidJob& job);
 
