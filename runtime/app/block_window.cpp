@@ -11,9 +11,9 @@
 #include "runtime/app/block_display.h"
 #include "runtime/app/block_scene.h"
 #include "runtime/app/fly_controls.h"
-#include "runtime/window/ground_probe.h"
 #include "runtime/app/hud.h"
 #include "runtime/scene/frame_governor.h"
+#include "runtime/window/ground_probe.h"
 
 namespace scree {
 namespace {
@@ -155,11 +155,12 @@ private:
 Result<void> view_blocks(ViewOptions o, std::shared_ptr<const SqliteStore> store, const BlockWindow& w) {
     auto scene = BlockScene::open(*store, scene_options(o));
     if (!scene) return scene.error();
-    DisplayOptions display_options{o.width_px, o.height_px};
-    display_options.window = true;
-    display_options.wait_for_refresh = true;
-    auto display = BlockDisplay::create(**scene, display_options);
+    DisplayOptions shown = display_options(o);
+    shown.window = true;
+    shown.wait_for_refresh = true;
+    auto display = BlockDisplay::create(**scene, shown);
     if (!display) return display.error();
+    set_look(o, (*display)->frame_settings());
     glfwSetWindowTitle((*display)->context().window(),
                        fmt::format("Scree - {}", std::filesystem::path(o.store).filename().string()).c_str());
     return Window(o, w, **scene, **display, std::move(store)).run();

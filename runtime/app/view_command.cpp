@@ -11,10 +11,10 @@
 #include "runtime/app/commands.h"
 #include "runtime/app/display.h"
 #include "runtime/app/fly_controls.h"
-#include "runtime/window/ground_probe.h"
 #include "runtime/app/hud.h"
 #include "runtime/app/view_options.h"
 #include "runtime/scene/frame_governor.h"
+#include "runtime/window/ground_probe.h"
 
 namespace scree {
 namespace {
@@ -80,11 +80,12 @@ Result<void> view(ViewOptions o, const WindowSettings& w) {
     options.follow = true;
     auto scene = Scene::open(std::move(*store), options);
     if (!scene) return scene.error();
-    DisplayOptions display_options{o.width_px, o.height_px};
-    display_options.window = true;
-    display_options.wait_for_refresh = true;
-    auto display = Display::create(**scene, display_options);
+    DisplayOptions shown = display_options(o);
+    shown.window = true;
+    shown.wait_for_refresh = true;
+    auto display = Display::create(**scene, shown);
     if (!display) return display.error();
+    set_look(o, (*display)->frame_settings());
     if (auto ok = (*scene)->start(**display); !ok) return ok;
     GroundProbe ground((*scene)->shared_store(), {});
     GLFWwindow* window = (*display)->context().window();
@@ -153,9 +154,9 @@ Result<void> view(ViewOptions o, const WindowSettings& w) {
                 if (auto ok = (*display)->resize_inset(inset_width, inset_height); !ok) return ok;
                 second_size = {inset_width, inset_height};
             }
-            const Dataset& shown = (*scene)->dataset();
+            const Dataset& dataset = (*scene)->dataset();
             auto above =
-                view_from_above(*camera, shown, std::max(ground_m, shown.min_height_m), inset_width, inset_height);
+                view_from_above(*camera, dataset, std::max(ground_m, dataset.min_height_m), inset_width, inset_height);
             if (!above) return above.error();
             views.push_back(*above);
         }
