@@ -222,8 +222,9 @@ Result<void> refuse_with_blocks(bool given, const std::string& option) {
 Result<void> shoot_blocks(const ViewOptions& o, const TileStore& store, const BlockShot& shot) {
     auto scene = BlockScene::open(store, scene_options(o));
     if (!scene) return scene.error();
-    auto display = BlockDisplay::create(**scene, {o.width_px, o.height_px});
+    auto display = BlockDisplay::create(**scene, display_options(o));
     if (!display) return display.error();
+    set_look(o, (*display)->frame_settings());
     (*display)->frame_settings().wireframe = shot.debug.wireframe;
     (*display)->frame_settings().magenta_background = shot.debug.magenta_background;
     const Dataset& d = (*scene)->dataset();
@@ -246,10 +247,11 @@ Result<void> shoot_blocks(const ViewOptions& o, const TileStore& store, const Bl
 Result<void> fly_blocks(const ViewOptions& o, const TileStore& store, const FlightPath& path, const BlockFlight& f) {
     auto scene = BlockScene::open(store, scene_options(o));
     if (!scene) return scene.error();
-    DisplayOptions display_options{o.width_px, o.height_px};
-    display_options.window = !f.headless;
-    auto display = BlockDisplay::create(**scene, display_options);
+    DisplayOptions shown = display_options(o);
+    shown.window = !f.headless;
+    auto display = BlockDisplay::create(**scene, shown);
     if (!display) return display.error();
+    set_look(o, (*display)->frame_settings());
     (*display)->frame_settings().wait_until_drawn = true;
     auto log = fly(o, path, f, **scene, **display);
     if (!log) return log.error();

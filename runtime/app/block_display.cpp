@@ -72,6 +72,7 @@ Result<std::unique_ptr<BlockDisplay>> BlockDisplay::create(const BlockScene& sce
                        : create_headless_context();
     if (!context) return context.error();
     display->context_ = std::move(*context);
+    display->samples_ = o.samples;
     auto renderer = make_renderer(scene);
     if (!renderer) return renderer.error();
     display->renderer_ = std::move(*renderer);
@@ -109,7 +110,7 @@ Result<void> BlockDisplay::change_to(const BlockScene& scene) {
 }
 
 Result<void> BlockDisplay::resize(int width_px, int height_px) {
-    auto target = RenderTarget::create({width_px, height_px, 0});
+    auto target = RenderTarget::create({width_px, height_px, samples_});
     if (!target) return target.error();
     target_ = std::make_unique<RenderTarget>(std::move(*target));
     return {};

@@ -12,7 +12,7 @@ namespace scree {
 
 class BlockDisplay {
 public:
-    /// Size and window of the options. `scene` outlives the display.
+    /// Size, window and samples of the options. `scene` outlives the display.
     static Result<std::unique_ptr<BlockDisplay>> create(const BlockScene& scene, const DisplayOptions& options);
 
     GlContext& context() { return *context_; }
@@ -35,6 +35,7 @@ private:
     std::unique_ptr<SurfaceRenderer> renderer_;
     std::unique_ptr<RenderTarget> target_;
     FrameSettings settings_;
+    int samples_ = 0;
 };
 
 }  // namespace scree

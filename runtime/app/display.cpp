@@ -15,7 +15,7 @@ Result<std::unique_ptr<Display>> Display::create(const Scene& scene, const Displ
     if (!context) return context.error();
     display->context_ = std::move(*context);
     display->samples_ = o.samples;
-    auto terrain = SceneRenderer::create(scene, {o.samples});
+    auto terrain = SceneRenderer::create(scene, {o.samples, o.anisotropy});
     if (!terrain) return terrain.error();
     display->terrain_ = std::move(*terrain);
     if (auto ok = display->resize(o.width_px, o.height_px); !ok) return ok.error();

@@ -17,7 +17,8 @@ struct DisplayOptions {
     bool visible_window = true;
     bool wait_for_refresh = false;
     bool keep_heights = false;  ///< also a CpuArena, for --mesh
-    int samples = 0;
+    int samples = 0;            ///< RenderTargetOptions
+    double anisotropy = 1;      ///< RendererOptions
 };
 
 class Display final : public TileSink {

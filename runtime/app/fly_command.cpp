@@ -302,10 +302,11 @@ Result<void> run(const ViewOptions& o, const FlyOptions& f) {
     if (!scene) return scene.error();
     auto path = path_of(**store, o, f);
     if (!path) return path.error();
-    DisplayOptions display_options{o.width_px, o.height_px};
-    display_options.window = !f.headless;
-    auto display = Display::create(**scene, display_options);
+    DisplayOptions shown = display_options(o);
+    shown.window = !f.headless;
+    auto display = Display::create(**scene, shown);
     if (!display) return display.error();
+    set_look(o, (*display)->frame_settings());
     const auto context_at = Clock::now();
     (*display)->frame_settings().wait_until_drawn = true;
     if (auto ok = (*scene)->start(**display); !ok) return ok;

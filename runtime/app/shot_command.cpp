@@ -38,10 +38,11 @@ Result<void> shoot(const ViewOptions& o, const std::optional<FlightPose>& asked,
     options.follow = true;  // a picture of one state, whatever happens meanwhile
     auto scene = Scene::open(std::move(*store), options);
     if (!scene) return scene.error();
-    DisplayOptions display_options{o.width_px, o.height_px};
-    display_options.keep_heights = !mesh_file.empty();
-    auto display = Display::create(**scene, display_options);
+    DisplayOptions shown = display_options(o);
+    shown.keep_heights = !mesh_file.empty();
+    auto display = Display::create(**scene, shown);
     if (!display) return display.error();
+    set_look(o, (*display)->frame_settings());
     (*display)->frame_settings().wireframe = debug.wireframe;
     (*display)->frame_settings().highlight = debug.highlight;
     (*display)->frame_settings().highlight_full_px = o.tau_px > 0 ? o.tau_px : 1;

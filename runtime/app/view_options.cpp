@@ -2,12 +2,31 @@
 
 #include <fmt/format.h>
 
+#include <charconv>
 #include <cmath>
 
 #include "common/cli/arguments.h"
 #include "common/report.h"
 
 namespace scree {
+
+namespace {
+
+/// Unit length, towards the sun.
+std::optional<glm::vec3> sun_direction_from(const std::string& text) {
+    double azimuth_deg = 0, altitude_deg = 0;
+    const char* end = text.data() + text.size();
+    const auto first = std::from_chars(text.data(), end, azimuth_deg);
+    if (first.ec != std::errc{} || first.ptr == end || *first.ptr != ',') return std::nullopt;
+    const auto second = std::from_chars(first.ptr + 1, end, altitude_deg);
+    if (second.ec != std::errc{} || second.ptr != end) return std::nullopt;
+    if (!(std::abs(azimuth_deg) <= 360 && std::abs(altitude_deg) <= 90)) return std::nullopt;
+    const double azimuth = glm::radians(azimuth_deg), altitude = glm::radians(altitude_deg);
+    return glm::vec3(std::sin(azimuth) * std::cos(altitude), std::cos(azimuth) * std::cos(altitude),
+                     std::sin(altitude));
+}
+
+}  // namespace
 
 void add_view_options(CLI::App& app, ViewOptions& o) {
     app.add_option("STORE", o.store, "A .scree file")->required();
@@ -26,6 +45,17 @@ void add_view_options(CLI::App& app, ViewOptions& o) {
         ->type_name("auto|on|off")
         ->capture_default_str();
     app.add_flag("--no-morph", o.no_morph, "Draw discrete levels: nothing moves, changes pop");
+    app.add_option("--msaa", o.samples, "Samples a pixel: smooth outlines; costs on software OpenGL")
+        ->check(CLI::IsMember({0, 2, 4, 8}))
+        ->capture_default_str();
+    app.add_option("--anisotropy", o.anisotropy, "Up to 16: sharper imagery at grazing angles; costs as well")
+        ->check(CLI::Range(1.0, 16.0))
+        ->capture_default_str();
+    app.add_option("--sun", o.sun, "AZIMUTH,ALTITUDE of the sun in degrees, from north by east; lights sky and haze")
+        ->type_name("AZIMUTH,ALTITUDE");
+    app.add_option("--edge", o.edge, "The end of the data: soft (it dissolves) or hard (it is cut)")
+        ->check(CLI::IsMember({"soft", "hard"}))
+        ->capture_default_str();
     add_lod_options(app, o.lod_options);
     add_json_option(app, o.json);
 }
@@ -76,6 +106,12 @@ Result<void> check_view_options(ViewOptions& o) {
     const auto lod = lod_settings_from(o.lod_options);
     if (!lod) return lod.error();
     o.lod = *lod;
+    if (!o.sun.empty()) {
+        o.sun_direction = sun_direction_from(o.sun);
+        if (!o.sun_direction)
+            return Error{ErrorCode::usage,
+                         fmt::format("--sun {} is not AZIMUTH,ALTITUDE within -360..360 and -90..90 degrees", o.sun)};
+    }
     if (!(o.fov_deg >= 0.001 && o.fov_deg <= 179))
         return Error{ErrorCode::usage, fmt::format("--fov {} is outside 0.001..179 degrees", o.fov_deg)};
     return {};
@@ -83,6 +119,18 @@ Result<void> check_view_options(ViewOptions& o) {
 
 Result<std::unique_ptr<SqliteStore>> open_store(const ViewOptions& o) {
     return SqliteStore::open(o.store, {o.exaggeration});
+}
+
+DisplayOptions display_options(const ViewOptions& o) {
+    DisplayOptions d{o.width_px, o.height_px};
+    d.samples = o.samples;
+    d.anisotropy = o.anisotropy;
+    return d;
+}
+
+void set_look(const ViewOptions& o, FrameSettings& s) {
+    if (o.sun_direction) s.sun_direction = *o.sun_direction;
+    if (o.edge == "hard") s.edge_band_m = 0;
 }
 
 SceneOptions scene_options(const ViewOptions& o) {

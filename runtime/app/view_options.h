@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 
 #include "common/store/sqlite_store.h"
+#include "runtime/app/display.h"
 #include "runtime/scene/scene.h"
 #include "runtime/view/camera.h"
 #include "runtime/view/flight_path.h"
@@ -24,6 +25,10 @@ struct ViewOptions {
     std::string budget = "256M";
     std::string curvature_text = "auto";
     bool no_morph = false;
+    int samples = 0;
+    double anisotropy = 1;
+    std::string sun;
+    std::string edge = "soft";
     LodOptions lod_options;
     std::optional<std::string> path;
     std::string json;
@@ -32,6 +37,7 @@ struct ViewOptions {
     std::int64_t budget_bytes = 0;
     Curvature curvature = Curvature::automatic;
     LodSettings lod;
+    std::optional<glm::vec3> sun_direction;
 };
 
 void add_view_options(CLI::App& app, ViewOptions& options);
@@ -41,6 +47,10 @@ void add_lod_options(CLI::App& app, LodOptions& options);
 Result<void> check_view_options(ViewOptions& options);
 /// The store, its heights as high as the options want them. Errors: those of SqliteStore.
 Result<std::unique_ptr<SqliteStore>> open_store(const ViewOptions& options);
+/// What the options say of the picture: its size, --msaa, --anisotropy.
+DisplayOptions display_options(const ViewOptions& options);
+/// The same of every frame: --sun, --edge.
+void set_look(const ViewOptions& options, FrameSettings& settings);
 /// The scene as the options want it.
 SceneOptions scene_options(const ViewOptions& options);
 Result<Camera> camera_of(const FlightPose& pose, const ViewOptions& options);

@@ -16,13 +16,14 @@ std::size_t DrawStream::blends_offset(std::size_t region) const {
 }
 
 std::size_t DrawStream::commands_offset(std::size_t region) const {
-    return blends_offset(kRegions) + region * static_cast<std::size_t>(max_draws_) * sizeof(DrawCommand);
+    return blends_offset(kRegions) + region * static_cast<std::size_t>(max_commands_) * sizeof(DrawCommand);
 }
 
-Result<DrawStream> DrawStream::create(int max_draws) {
+Result<DrawStream> DrawStream::create(int max_draws, int more_commands) {
     assert(max_draws >= 1);
     DrawStream stream;
     stream.max_draws_ = max_draws;
+    stream.max_commands_ = max_draws + more_commands;
     GLuint name = 0;
     glCreateBuffers(1, &name);
     stream.buffer_ = BufferHandle(name);
@@ -54,7 +55,8 @@ DrawStream::Region DrawStream::begin_frame() {
     region.commands_offset = commands_offset(current_);
     region.attributes_offset = attributes_offset(current_);
     region.blends_offset = blends_offset(current_);
-    region.commands = {reinterpret_cast<DrawCommand*>(mapped_ + region.commands_offset), draws};
+    region.commands = {reinterpret_cast<DrawCommand*>(mapped_ + region.commands_offset),
+                       static_cast<std::size_t>(max_commands_)};
     region.attributes = {reinterpret_cast<DrawAttributes*>(mapped_ + region.attributes_offset), draws};
     region.blends = {reinterpret_cast<BlendAttributes*>(mapped_ + region.blends_offset), draws};
     return region;

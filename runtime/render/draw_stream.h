@@ -63,10 +63,11 @@ public:
     DrawStream& operator=(DrawStream&&) = default;
     ~DrawStream();
     /// Errors (ErrorCode::display): the driver has no memory for it.
-    static Result<DrawStream> create(int max_draws);
+    /// `more_commands`: those that draw again with the attributes of others.
+    static Result<DrawStream> create(int max_draws, int more_commands = 0);
 
-    /// One frame's share of the buffer: write (never read) max_draws of each; offsets are in bytes from the buffer's
-    /// start.
+    /// One frame's share of the buffer: write (never read) max_draws of each, and more_commands; offsets are in bytes
+    /// from the buffer's start.
     struct Region {
         std::span<DrawCommand> commands;
         std::span<DrawAttributes> attributes;
@@ -101,6 +102,7 @@ private:
     BufferHandle buffer_;
     std::byte* mapped_ = nullptr;
     int max_draws_ = 0;
+    int max_commands_ = 0;
     std::size_t current_ = 0;
     std::array<Fence, kRegions> in_use_;
 };

@@ -81,4 +81,33 @@ void SkyPass::draw(const Camera& camera, const FrameSettings& settings) const {
     glDrawArrays(GL_TRIANGLES, 0, 3);
 }
 
+Result<EdgePass> EdgePass::create(int tile_cells_log2) {
+    EdgePass edge;
+    auto program = build_edge_program(tile_cells_log2);
+    if (!program) return program.error();
+    edge.program_ = std::move(*program);
+    return edge;
+}
+
+void EdgePass::begin(const Camera& camera, const RelativeFrame& frame, const Lattice& lattice,
+                     const FrameSettings& settings) const {
+    const GLuint program = program_.name();
+    set_position(program, camera, frame);
+    set_atmosphere(program, camera, settings);
+    glProgramUniform4f(program, shader::kBoxUniform, static_cast<float>(lattice.x_m(0) - camera.eye.x),
+                       static_cast<float>(lattice.y_m(lattice.cells_y) - camera.eye.y),
+                       static_cast<float>(lattice.x_m(lattice.cells_x) - camera.eye.x),
+                       static_cast<float>(lattice.y_m(0) - camera.eye.y));
+    glProgramUniform1f(program, shader::kBandUniform, static_cast<float>(1 / settings.edge_band_m));
+    glUseProgram(program);
+    glEnable(GL_BLEND);
+    glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
+    glDepthMask(GL_FALSE);
+}
+
+void EdgePass::end() {
+    glDisable(GL_BLEND);
+    glDepthMask(GL_TRUE);
+}
+
 }  // namespace scree

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 
+#include "common/lattice.h"
 #include "common/result.h"
 #include "runtime/render/gl_handle.h"
 #include "runtime/render/render_target.h"
@@ -31,6 +32,20 @@ public:
 private:
     ProgramHandle program_;
     VertexArrayHandle array_;  ///< no attributes
+};
+
+/// Dissolves the data's ends into what is behind them: the tiles there, once more, after the sky.
+class EdgePass {
+public:
+    /// Errors (ErrorCode::display): the shader does not compile.
+    static Result<EdgePass> create(int tile_cells_log2);
+    /// State and uniforms for drawing tiles again; then end().
+    void begin(const Camera& camera, const RelativeFrame& frame, const Lattice& lattice,
+               const FrameSettings& settings) const;
+    static void end();
+
+private:
+    ProgramHandle program_;
 };
 
 }  // namespace scree

@@ -99,6 +99,15 @@ Result<ProgramHandle> build_terrain_program(const TerrainVariant& variant) {
                           {}});
 }
 
+Result<ProgramHandle> build_edge_program(int tile_cells_log2) {
+    using namespace shader_source;
+    return build_program(
+        {"edge",
+         terrain_vertex_sources(tile_cells_log2, Imagery::plain),
+         {std::string(shared_constants), std::string(atmosphere), std::string(dither), std::string(edge_frag)},
+         {}});
+}
+
 Result<ProgramHandle> build_surface_program(bool with_haze) {
     using namespace shader_source;
     return build_program({"surface",
@@ -119,10 +128,11 @@ Result<ProgramHandle> build_line_program() {
 
 Result<ProgramHandle> build_sky_program() {
     using namespace shader_source;
-    return build_program({"sky",
-                          {std::string(shared_constants), std::string(sky_vert)},
-                          {std::string(shared_constants), std::string(atmosphere), std::string(sky_frag)},
-                          {}});
+    return build_program(
+        {"sky",
+         {std::string(shared_constants), std::string(sky_vert)},
+         {std::string(shared_constants), std::string(atmosphere), std::string(dither), std::string(sky_frag)},
+         {}});
 }
 
 }  // namespace scree

@@ -14,6 +14,7 @@
 
 #include "runtime/render/draw_batches.h"
 #include "runtime/render/draw_stream.h"
+#include "runtime/render/edge_parts.h"
 #include "runtime/render/frame_passes.h"
 #include "runtime/render/index_arena.h"
 #include "runtime/render/program.h"
@@ -28,6 +29,11 @@ namespace {
 constexpr GLuint kVertexBinding = 0;
 constexpr GLuint kDrawBinding = 1;
 constexpr GLuint kBlendBinding = 2;
+
+/// Draws at the data's ends, per item that may be drawn.
+constexpr int kEdgeDraws = 2;
+/// Tiles there are drawn by parts of a quarter of their side: finer ones would be more draws for few pixels less.
+constexpr int kEdgePartLevel = 2;
 
 using Clock = std::chrono::steady_clock;
 
@@ -121,6 +127,7 @@ struct Renderer::State {
     DrawStream stream;
     VertexArrayHandle plain_array, blended_array;
     SkyPass sky;
+    EdgePass edge;
     std::array<std::array<ProgramHandle, 4>, kImageryKinds> terrain;  ///< [imagery][haze + 2 * highlight]
 
     int bound_arrays = 1;  ///< by Imagery::blended_of_all
@@ -135,6 +142,11 @@ struct Renderer::State {
     TextureCode texture_code(std::int32_t slot, const DrawBatch& batch, bool coarse = false) const;
     void draw_terrain(const Camera& camera, const FrameSettings& settings, const DrawStream::Region& region,
                       FrameTimes& times);
+    /// Commands for the parts of tiles that lie where the data ends, behind all draws; returns how many.
+    std::size_t write_edge(std::span<const DrawItem> items, const FrameSettings& settings,
+                           const DrawStream::Region& region) const;
+    void draw_edge(const Camera& camera, const FrameSettings& settings, const DrawStream::Region& region,
+                   std::size_t count) const;
     void bind_textures(const DrawBatch& batch) const;
     void draw_batch(const DrawBatch& batch, const FrameSettings& settings, const DrawStream::Region& region) const;
 };
@@ -218,6 +230,44 @@ std::uint64_t Renderer::State::write_draws(std::span<const DrawItem> items, cons
     return triangles;
 }
 
+std::size_t Renderer::State::write_edge(std::span<const DrawItem> items, const FrameSettings& settings,
+                                        const DrawStream::Region& region) const {
+    if (!(settings.edge_band_m > 0) || settings.wireframe || settings.magenta_background) return 0;
+    EdgeParts parts(options.lattice, settings.edge_band_m);
+    const std::size_t first = batches.draws().size(), room = region.commands.size();
+    std::size_t count = 0;
+    for (std::size_t draw = 0; draw < first; ++draw) {
+        const SortedDraw& sorted = batches.draws()[draw];
+        if (sorted.shape == DrawShape::ring) continue;  // with the item's other draw
+        const DrawItem& item = items[sorted.item];
+        const int finest =
+            item.mesh.count > 0 ? 0 : std::min(kEdgePartLevel, options.lattice.tile_cells_log2 - 1 - item.geomip);
+        for (const TilePart part : parts.of(item, finest)) {
+            if (first + count == room) return count;
+            DrawItem some = item;
+            some.part = part;
+            const IndexRange range = indices.range(some, DrawShape::whole);
+            region.commands[first + count++] = {range.count, 1, range.first,
+                                                item.height_slot * vertices.slot_vertices(),
+                                                static_cast<std::uint32_t>(draw)};
+        }
+    }
+    return count;
+}
+
+void Renderer::State::draw_edge(const Camera& camera, const FrameSettings& settings, const DrawStream::Region& region,
+                                std::size_t count) const {
+    const RelativeFrame frame = make_relative_frame(options.lattice, options.height_offset_m, options.height_quantum_m,
+                                                    camera.eye, settings.half_curvature);
+    edge.begin(camera, frame, options.lattice, settings);
+    glBindVertexArray(plain_array.name());
+    glMultiDrawElementsIndirect(
+        GL_TRIANGLES, indices.type(),
+        reinterpret_cast<const void*>(region.commands_offset + batches.draws().size() * sizeof(DrawCommand)),
+        static_cast<GLsizei>(count), sizeof(DrawCommand));
+    EdgePass::end();
+}
+
 void Renderer::State::bind_textures(const DrawBatch& batch) const {
     const auto bind = [this](int unit, int array) {
         glBindTextureUnit(static_cast<GLuint>(shader::kImageryTextureUnit + unit),
@@ -283,7 +333,7 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const RendererOptions& option
         {options.texture_size_log2, options.texture_slots, options.anisotropy, options.max_array_layers});
     if (!textures) return textures.error();
     state->textures = std::move(*textures);
-    auto stream = DrawStream::create(2 * options.max_draws);
+    auto stream = DrawStream::create(2 * options.max_draws, kEdgeDraws * options.max_draws);
     if (!stream) return stream.error();
     state->stream = std::move(*stream);
 
@@ -299,6 +349,9 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const RendererOptions& option
     state->indices = std::move(*indices);
     state->plain_array = make_vertex_array(state->vertices, state->indices, false);
     state->blended_array = make_vertex_array(state->vertices, state->indices, true);
+    auto edge = EdgePass::create(tile_cells_log2);
+    if (!edge) return edge.error();
+    state->edge = std::move(*edge);
     auto sky = SkyPass::create();
     if (!sky) return sky.error();
     state->sky = std::move(*sky);
@@ -327,11 +380,16 @@ FrameTimes Renderer::draw(const Camera& camera, std::span<const DrawItem> items,
     const DrawStream::Region region = state_->stream.begin_frame();
     times.triangles = state_->write_draws(items, settings, region);
     times.draws = static_cast<std::uint32_t>(state_->batches.draws().size());
+    const std::size_t edge_draws = state_->write_edge(items, settings, region);
+    times.edge_draws = static_cast<std::uint32_t>(edge_draws);
 
     begin_picture(target);
     state_->draw_terrain(camera, settings, region, times);
+    if (!settings.magenta_background) {
+        state_->sky.draw(camera, settings);
+        if (edge_draws > 0) state_->draw_edge(camera, settings, region, edge_draws);
+    }
     state_->stream.end_frame();
-    if (!settings.magenta_background) state_->sky.draw(camera, settings);
 
     times.submitted_ms = ms_since(start);
     if (settings.wait_until_drawn) {

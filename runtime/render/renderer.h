@@ -32,7 +32,8 @@ struct RendererOptions {
     int texture_slots = 1;
     /// Capacity of the frames' MeshPool, 0 without one: mesh_arena_bytes() says what it takes.
     std::size_t mesh_indices = 0;
-    /// Items a frame at most. Each may be two draws, of 124 bytes each, three times.
+    /// Items a frame at most. Each may be two draws, of 124 bytes each, and two more at the data's ends, of 20 bytes,
+    /// three times.
     int max_draws = 4096;
     /// 1: off; up to 16: sharper imagery at grazing angles; costs 5 to 6 ms at 800x800 on software OpenGL.
     double anisotropy = 1;
@@ -53,6 +54,9 @@ struct FrameSettings {
     double haze_scale_height_m = 2500;
     /// Height (z) of the plane that stands in for the world beyond the data.
     double ground_height_m = 0;
+    /// Metres over which the data's ends (its lattice's) dissolve into what is behind; 0: they are cut. Larger hides
+    /// more of the data and costs the drawing of sky on it. Not with wireframe or magenta_background.
+    double edge_band_m = 0;
     /// 1 / (2 R) of the earth's curvature, 1/m; 0: flat.
     double half_curvature = 0;
     /// For finding faults.
@@ -68,6 +72,7 @@ struct FrameTimes {
     std::uint32_t draws = 0;
     std::uint32_t blended_draws = 0;  ///< those that look at several textures: fading in, or filtered over a border
     std::uint32_t multi_draws = 0;
+    std::uint32_t edge_draws = 0;     ///< parts of tiles drawn again where the data ends
     std::uint32_t imagery_kinds = 0;  ///< bits: the Imagery of the draws, a program each
     std::uint64_t triangles = 0;
     double submitted_ms = 0;  ///< wall time of draw() without waiting

@@ -7,10 +7,12 @@
 #include <array>
 #include <cassert>
 #include <chrono>
+#include <cmath>
 #include <cstddef>
 #include <cstring>
 #include <utility>
 
+#include "common/tint/hypsometry.h"
 #include "runtime/render/frame_passes.h"
 #include "runtime/render/gl_handle.h"
 #include "runtime/render/program.h"
@@ -51,6 +53,24 @@ VertexArrayHandle make_vertex_array(GLuint vertices, GLuint indices) {
     return VertexArrayHandle(name);
 }
 
+float light_of(double srgb) {
+    const double c = srgb / 255;
+    return static_cast<float>(c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4));
+}
+
+std::array<glm::vec3, shader::kTintColours> tints_of(const SurfaceOptions& o) {
+    const double low_m = o.height_offset_m + o.low_n * o.height_quantum_m,
+                 high_m = o.height_offset_m + o.high_n * o.height_quantum_m;
+    const Hypsometry colours(low_m, high_m);
+    std::array<glm::vec3, shader::kTintColours> tints;
+    for (std::size_t k = 0; k < tints.size(); ++k) {
+        const TintColour c =
+            colours.at(low_m + (high_m - low_m) * static_cast<double>(k) / (static_cast<double>(tints.size()) - 1));
+        tints[k] = {light_of(c.r), light_of(c.g), light_of(c.b)};
+    }
+    return tints;
+}
+
 }  // namespace
 
 struct SurfaceRenderer::State {
@@ -60,6 +80,7 @@ struct SurfaceRenderer::State {
     VertexArrayHandle array;
     std::array<ProgramHandle, 2> ground;  ///< without haze and with it
     SkyPass sky;
+    std::array<glm::vec3, shader::kTintColours> tints;
 
     /// Returns how many.
     Result<std::size_t> upload(std::span<const std::span<const std::uint32_t>> pieces);
@@ -100,6 +121,7 @@ void SurfaceRenderer::State::draw_ground(const Camera& camera, const FrameSettin
         make_relative_frame(options.lattice, options.height_offset_m, options.height_quantum_m, camera.eye, 0));
     set_atmosphere(program, camera, settings);
     const double span_n = std::max(options.high_n - options.low_n, 1.0);
+    glProgramUniform3fv(program, shader::kTintColoursUniform, shader::kTintColours, &tints[0].x);
     glProgramUniform2f(program, shader::kTintUniform, static_cast<float>(1 / span_n),
                        static_cast<float>(-options.low_n / span_n));
     glUseProgram(program);
@@ -117,6 +139,7 @@ Result<std::unique_ptr<SurfaceRenderer>> SurfaceRenderer::create(const SurfaceOp
     assert(!vertices.empty());
     auto state = std::make_unique<State>();
     state->options = options;
+    state->tints = tints_of(options);
     for (const bool with_haze : {false, true}) {
         auto program = build_surface_program(with_haze);
         if (!program) return program.error();

@@ -9,7 +9,6 @@
 #include <mutex>
 
 #include "common/store/height_codec.h"
-#include "tools/pyramid/tint.h"
 #include "tools/stage_clock.h"
 
 namespace scree {
@@ -31,6 +30,7 @@ TexelGround::TexelGround(const Dataset& dataset, const Lattice& base, const Heig
       base_(base),
       index_(index),
       read_(std::move(read)),
+      tint_({dataset.min_height_m, dataset.max_height_m, base.spacing_m}),
       texels_a_cell_(std::llround(base.spacing_m / dataset.texel_m(texture_level))) {}
 
 TexelGround::~TexelGround() = default;
@@ -135,10 +135,9 @@ Result<void> TexelGround::load(Tile& tile, TileId id) const {
     std::transform(decoded->samples.begin(), decoded->samples.end(), metres.begin(),
                    [&](std::int32_t n) { return dataset_.height_m(n); });
     tile.tint.resize(m * m * 4);
-    const TintOptions options{dataset_.min_height_m, dataset_.max_height_m, base_.spacing_m};
     for (std::size_t r = 0; r < m; ++r)
-        tint_row({metres.data() + r * (m + 1), m + 1}, {metres.data() + (r + 1) * (m + 1), m + 1}, options,
-                 {tile.tint.data() + r * m * 4, m * 4});
+        tint_.row({metres.data() + r * (m + 1), m + 1}, {metres.data() + (r + 1) * (m + 1), m + 1},
+                  {tile.tint.data() + r * m * 4, m * 4});
     tile.loaded = true;
     return {};
 }

@@ -12,6 +12,7 @@
 #include "common/height_tile.h"
 #include "common/store/tile_store.h"
 #include "tools/pyramid/height_index.h"
+#include "tools/pyramid/tint.h"
 
 namespace scree {
 
@@ -47,6 +48,7 @@ private:
     Lattice base_;
     const HeightIndex& index_;
     HeightRowReader read_;
+    Tint tint_;
     std::int64_t texels_a_cell_;
     std::unordered_map<std::int64_t, std::unique_ptr<Tile>> columns_;  // by tile column, the tile in use
 };

@@ -7,9 +7,9 @@ layout(location = kSunUniform) uniform vec3 sun_direction;
 // w density at the eye, exp(-z * y).
 layout(location = kHazeUniform) uniform vec4 haze;
 
-const vec3 kZenith = vec3(0.055, 0.170, 0.480);
-const vec3 kHorizon = vec3(0.560, 0.680, 0.800);
-const vec3 kGround = vec3(0.340, 0.405, 0.450);
+const vec3 kZenith = vec3(0.040, 0.150, 0.460);
+const vec3 kHorizon = vec3(0.590, 0.690, 0.790);
+const vec3 kGround = vec3(0.085, 0.130, 0.170);
 const vec3 kSunlight = vec3(1.000, 0.860, 0.640);
 
 // Plain multiplications stand in for pow() and exp(): on software OpenGL the sky costs what it computes.
@@ -34,14 +34,14 @@ float mean_haze_density(float rise_m) {
     return abs(rise) < 1e-2 ? haze.w * (1.0 - 0.5 * rise) : (haze.w - density_there) / rise;
 }
 
-// Share of light lost over a ray (Beer-Lambert).
-float haze_share(float mean_density, float distance_m) { return 1.0 - exp(-mean_density * distance_m * haze.x); }
-
-// What is seen of a colour at the end of a ray.
+// What is seen of a colour at the end of a ray. Air scatters blue before red: what is far turns blue, then pale.
 vec3 hazy(vec3 colour, vec3 ray_m, float mean_density) {
     float distance_m = length(ray_m);
     vec3 horizon = horizon_colour(towards_sun(ray_m / distance_m));
-    return mix(colour, horizon, haze_share(mean_density, distance_m));
+    // Extinction 3/4, 1 and 5/4 of the mean, of one exponential.
+    float quarter = exp(-0.25 * mean_density * distance_m * haze.x);
+    float square = quarter * quarter;
+    return mix(horizon, colour, quarter * square * vec3(1.0, quarter, square));
 }
 
 vec3 sky_colour(vec3 direction) {
@@ -50,7 +50,9 @@ vec3 sky_colour(vec3 direction) {
     // Below the horizon the ray meets the ground plane; mean density times distance is (1 - haze.w) / (haze.y * -z).
     if (direction.z < 0.0) {
         float depth = (1.0 - haze.w) * haze.x / (haze.y * max(-direction.z, 1e-6));
-        return mix(kGround, horizon, 1.0 - exp(-depth));
+        // As still water would, the plane mirrors the sky the more the flatter it is seen.
+        vec3 ground = mix(kGround, horizon, 0.55 * fourth_power(1.0 + direction.z));
+        return mix(horizon, ground, exp(-depth));
     }
     float near_sun = fourth_power(fourth_power(towards));         // ^16
     float glow = fourth_power(near_sun) * near_sun * near_sun;    // ^96: a few degrees
