@@ -17,12 +17,13 @@ Result<std::unique_ptr<Stage>> BlockStage::create(const ViewOptions& o, std::sha
     auto scene = BlockScene::open(*stage->store_, scene_options(o));
     if (!scene) return scene.error();
     stage->scene_ = std::move(*scene);
-    DisplayOptions display_options{o.width_px, o.height_px};
-    display_options.window = true;
-    display_options.wait_for_refresh = true;
-    auto display = BlockDisplay::create(*stage->scene_, display_options);
+    DisplayOptions shown = display_options(o);
+    shown.window = true;
+    shown.wait_for_refresh = true;
+    auto display = BlockDisplay::create(*stage->scene_, shown);
     if (!display) return display.error();
     stage->display_ = std::move(*display);
+    set_look(o, stage->display_->frame_settings());
     return std::unique_ptr<Stage>(std::move(stage));
 }
 
