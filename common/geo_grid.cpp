@@ -19,7 +19,8 @@ constexpr int kMostTaps = 8;
 constexpr double kSlack = 1e-9;  // of a cell: what lies on the box's side is within
 constexpr int kMostStarts = 8;
 constexpr int kMostSteps = 50;
-constexpr double kSamePlace = 1e-9;  // between normals: 6 mm
+constexpr double kDamping = 1e-12, kLeast = 1e-150;
+constexpr double kSamePlace = 1e-11;  // between normals: 64 um
 
 double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
@@ -99,9 +100,8 @@ std::optional<NodePlace> solve(const GeoGrid& grid, const Vector& target, NodePl
         const Vector n = scaled(s.value, 1 / length);
         const Vector off{target[0] - n[0], target[1] - n[1], target[2] - n[2]};
         const Vector a = tangent(s.by_column, n, 1 / length), b = tangent(s.by_row, n, 1 / length);
-        // Where the map is singular (a pole that is a side of the map) the damping decides.
-        const double damping = 1e-13 * (dot(a, a) + dot(b, b)) + 1e-300;
-        const double aa = dot(a, a) + damping, bb = dot(b, b) + damping, ab = dot(a, b);
+        // Damped, each by its own size: where the map is singular (a pole that is a side of it) neither divides by 0.
+        const double aa = dot(a, a) * (1 + kDamping) + kLeast, bb = dot(b, b) * (1 + kDamping) + kLeast, ab = dot(a, b);
         const double determinant = aa * bb - ab * ab;
         if (!(determinant > 0)) return std::nullopt;
         const double column = std::clamp((bb * dot(a, off) - ab * dot(b, off)) / determinant, -1.0, 1.0);

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <cmath>
+#include <functional>
 #include <thread>
 
 #include "common/store/height_codec.h"
@@ -235,6 +237,91 @@ TEST_F(SceneOfHills, AdvancingTakesNoMoreThanItsShareOfArrivals) {
         std::this_thread::sleep_for(std::chrono::microseconds(200));
     }
     EXPECT_GT(uploads, 10);
+}
+
+SceneFrame advance_until(Scene& scene, const Camera& camera, const std::function<bool()>& done) {
+    SceneFrame frame;
+    for (int k = 0; k < 20000 && !done(); ++k) {
+        EXPECT_TRUE(scene.follow().ok());
+        frame = scene.advance({&camera, 1}, k * 0.01);
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    return frame;
+}
+
+TEST_F(SceneOfHills, ExaggeratedHeightsAreTheSameTerrainHigherWithTheSamePromise) {
+    Staged staged(*stored_, small_options());
+    Scene& scene = *staged.scene;
+    const Dataset plain = scene.dataset();
+    Camera camera = stored_->camera(200, 512);
+    const auto before = scene.complete({&camera, 1});
+    ASSERT_TRUE(before.ok());
+    const std::int64_t triangles = before->selection->triangles;
+    ASSERT_TRUE(scene.set_exaggeration(4).ok());
+    const Dataset& d = scene.dataset();
+    EXPECT_EQ(d.exaggeration, 4);
+    EXPECT_EQ(d.height_offset_m, 4 * plain.height_offset_m);
+    EXPECT_EQ(d.height_quantum_m, 4 * plain.height_quantum_m);
+    EXPECT_EQ(d.height_quantum_error_m, 4 * plain.height_quantum_error_m);
+    EXPECT_EQ(d.warp_error_m, 4 * plain.warp_error_m);
+    EXPECT_EQ(d.min_height_m, 4 * plain.min_height_m);
+    EXPECT_EQ(d.max_height_m, 4 * plain.max_height_m);
+    EXPECT_EQ(dataset_to_json(d).find("exaggeration"), std::string::npos);
+    EXPECT_EQ(scene.updates(), 1);
+    // There is a picture at once: roots, if nothing else.
+    EXPECT_FALSE(scene.advance({&camera, 1}, 0).selection->draws[0].empty());
+    camera.eye.z += d.max_height_m - plain.max_height_m;
+    const auto after = scene.complete({&camera, 1});
+    ASSERT_TRUE(after.ok()) << after.error().message;
+    EXPECT_LE(after->selection->max_bound_px, scene.options().tau_px);
+    EXPECT_GT(after->selection->triangles, triangles);
+    // And back.
+    ASSERT_TRUE(scene.set_exaggeration(1).ok());
+    camera.eye.z = stored_->camera(200, 512).eye.z;
+    const auto again = scene.complete({&camera, 1});
+    ASSERT_TRUE(again.ok());
+    EXPECT_EQ(again->selection->triangles, triangles);
+    EXPECT_EQ(scene.dataset().max_height_m, plain.max_height_m);
+    ASSERT_TRUE(scene.set_exaggeration(1).ok());
+    EXPECT_EQ(scene.updates(), 2) << "the same again changes nothing";
+}
+
+TEST_F(SceneOfHills, AnExaggerationOutOfRangeChangesNothing) {
+    Staged staged(*stored_, small_options());
+    const Camera camera = stored_->camera(200, 512);
+    for (const double exaggeration : {0.0, -1.0, 0.0099, 100.1, std::nan(""), 1e300}) {
+        const auto ok = staged.scene->set_exaggeration(exaggeration);
+        ASSERT_FALSE(ok.ok()) << exaggeration;
+        EXPECT_EQ(ok.error().code, ErrorCode::usage);
+    }
+    EXPECT_EQ(staged.scene->dataset().exaggeration, 1);
+    EXPECT_EQ(staged.scene->updates(), 0);
+    EXPECT_TRUE(staged.scene->complete({&camera, 1}).ok());
+}
+
+TEST(SceneThatFollows, KeepsItsExaggerationThroughUpdates) {
+    const StoredTerrain stored(hills());
+    SceneOptions options = small_options();
+    options.follow = true;
+    Staged staged(stored, options);
+    Scene& scene = *staged.scene;
+    ASSERT_TRUE(scene.set_exaggeration(3).ok());
+    const Camera camera = stored.camera(200, 512);
+    // The same tiles, then another quantum, for which memory is divided anew.
+    for (const double factor : {1.0, 0.5}) {
+        Dataset next = stored.store().dataset();
+        next.height_quantum_m *= factor;
+        next.attribution = std::string(5, 'a') + std::to_string(factor);
+        auto writer = SqliteStoreWriter::amend(stored.store().path());
+        ASSERT_TRUE(writer.ok());
+        ASSERT_TRUE((*writer)->finish(next).ok());
+        advance_until(scene, camera, [&] { return scene.dataset().attribution == next.attribution; });
+        ASSERT_EQ(scene.dataset().attribution, next.attribution);
+        EXPECT_EQ(scene.dataset().exaggeration, 3);
+        EXPECT_EQ(scene.dataset().height_quantum_m, 3 * next.height_quantum_m);
+    }
+    EXPECT_EQ(scene.updates(), 3);
+    EXPECT_TRUE(scene.complete({&camera, 1}).ok());
 }
 
 struct Flown {
