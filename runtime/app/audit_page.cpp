@@ -30,12 +30,13 @@ std::string error_chart(const AuditResult& r, const AuditFacts& facts) {
         series.push_back({"greatest against the sources", values(r, &AuditFrame::source_max_px)});
     LineChart chart = frame_chart("True error and promise", "pixels", series);
     chart.levels.push_back({fmt::format("tau {:g}", facts.tau_px), facts.tau_px});
+    chart.y.logarithmic = is_wide(values(r, &AuditFrame::promised_px), facts.tau_px);
     return to_figure(chart);
 }
 
 // 1, 2, 5 a decade, up to what holds the greatest error.
 std::string histogram(const ErrorHistogram& errors, const std::string& title) {
-    constexpr int kDecades = 4;
+    constexpr int kDecades = 3;
     BarChart chart;
     chart.title = title;
     chart.groups_label = "error up to, pixels";
@@ -68,8 +69,8 @@ Result<std::string> picture_section(const AuditResult& r, const AuditFacts& fact
     std::vector<std::string> captions;
     for (const PosePicture& p : pictures) {
         const AuditFrame& f = r.frames[p.frame];
-        captions.push_back(fmt::format("Frame {}: {} triangles, true error at most {:.3g} px, promised {:.3g} px",
-                                       p.frame, f.triangles, f.max_px, f.promised_px));
+        captions.push_back(fmt::format("Frame {}: {} triangles, true error at most {:.3g} px, promised {} px", p.frame,
+                                       f.triangles, f.max_px, short_number(f.promised_px)));
     }
     auto seen = pictures_html(pictures, captions);
     if (!seen) return seen;
@@ -147,15 +148,16 @@ std::string audit_verdict(const AuditResult& r, const AuditFacts& facts) {
         fmt::format("{}, {} samples of the finest data: nothing drawn was further than {:.3g} px from it",
                     counted(static_cast<std::int64_t>(r.frames.size()), "frame", "frames"),
                     short_number(static_cast<double>(r.errors.count())), r.errors.max());
-    if (r.errors.count() > 0)
+    if (r.errors.max() > facts.tau_px)
         text += fmt::format(
             ", {} within {:.3g} px",
             percent(static_cast<double>(r.errors.count_within(facts.tau_px)) / static_cast<double>(r.errors.count())),
             facts.tau_px);
-    if (facts.guaranteed) text += fmt::format("; promised was {:.3g} px", std::max(facts.tau_px, r.max_bound_px));
+    if (facts.guaranteed)
+        text += fmt::format("; promised was {} px", short_number(std::max(facts.tau_px, r.max_bound_px)));
     text += fmt::format("; {}, {}, {}", counted(r.cracks.open_edges, "open edge", "open edges"),
                         counted(r.cracks.t_junctions, "T-junction", "T-junctions"),
-                        counted(r.holes, "hole", "cells without ground, or with two"));
+                        counted(r.holes, "hole", "cells in holes"));
     if (!r.kept) return text + ". The promise is broken.";
     return text + (facts.guaranteed ? ". The promise holds." : ". No error is promised.");
 }

@@ -11,8 +11,6 @@ namespace {
 constexpr double kMega = 1e6;
 /// What is as good as the tolerance: rounding of its sums.
 constexpr double kTauSlack = 1 + 1e-9;
-/// From here on a linear axis would show nothing but its peaks.
-constexpr double kWideRange = 4;
 
 std::vector<double> scaled(const Series& series, double unit) {
     std::vector<double> values = series.values;
@@ -60,7 +58,7 @@ std::string charts(const FlightLog& log, const FlightFacts& facts) {
                                    {"tolerance in force", log.of(&FlightFrame::tau_effective_px).values, true},
                                    {"mean over the screen", log.of(&FlightFrame::mean_bound_px).values}});
     error.levels.push_back({fmt::format("tau {:g}", facts.tau_px), facts.tau_px});
-    error.y.logarithmic = facts.tau_px > 0 && promised.max() > kWideRange * facts.tau_px;
+    error.y.logarithmic = is_wide(promised.values, facts.tau_px);
     html += to_figure(error);
 
     LineChart memory = frame_chart("Memory for tiles", "MB",
@@ -94,8 +92,8 @@ Result<std::string> picture_section(const FlightLog& log, const std::vector<Pose
     std::vector<std::string> captions;
     for (const PosePicture& p : pictures) {
         const FlightFrame& f = log.frames[p.frame];
-        captions.push_back(fmt::format("Frame {}: {} triangles, at most {:.3g} px{}", p.frame, f.triangles,
-                                       f.max_bound_px,
+        captions.push_back(fmt::format("Frame {}: {} triangles, at most {} px{}", p.frame, f.triangles,
+                                       short_number(f.max_bound_px),
                                        f.stand_ins > 0 ? fmt::format(", {} stand-ins", f.stand_ins) : ""));
     }
     auto html = pictures_html(pictures, captions);
@@ -175,12 +173,12 @@ std::string flight_verdict(const FlightLog& log, const FlightFacts& facts) {
     std::string text = fmt::format("{}, median {:.3g} ms, 99 % within {:.3g} ms; ",
                                    counted(static_cast<std::int64_t>(log.frames.size()), "frame", "frames"),
                                    frame_ms.quantile(0.5), frame_ms.quantile(0.99));
-    text += fmt::format("nothing drawn was further than {:.3g} px from the finest data{}; ",
-                        log.of(&FlightFrame::max_bound_px).max(), beyond_tau_text(log, facts));
+    text += fmt::format("nothing drawn was further than {} px from the finest data{}; ",
+                        short_number(log.of(&FlightFrame::max_bound_px).max()), beyond_tau_text(log, facts));
     text += fmt::format("memory for tiles stayed at {:.0f} of {:.0f} MB; ",
                         static_cast<double>(log.most_resident_bytes()) / kMega,
                         static_cast<double>(facts.budget_bytes) / kMega);
-    text += counted(holes, "hole", "cells without ground, or with two");
+    text += counted(holes, "hole", "cells in holes");
     if (facts.see_through && log.see_through > 0) text += fmt::format("; {} pixels seen through", log.see_through);
     if (facts.paging.damaged_tiles > 0)
         text += "; " + counted(facts.paging.damaged_tiles, "damaged tile", "damaged tiles");

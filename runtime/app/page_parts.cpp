@@ -50,6 +50,10 @@ LineChart frame_chart(const std::string& title, const std::string& what, const s
     return chart;
 }
 
+bool is_wide(const std::vector<double>& values, double tau_px) {
+    return std::any_of(values.begin(), values.end(), [&](double v) { return tau_px > 0 && v > 4 * tau_px; });
+}
+
 std::string counted(std::int64_t count, const std::string& one, const std::string& many) {
     if (count == 0) return "no " + one;
     return fmt::format("{} {}", count, count == 1 ? one : many);

@@ -35,6 +35,9 @@ struct FrameSeries {
 };
 LineChart frame_chart(const std::string& title, const std::string& what, const std::vector<FrameSeries>& series);
 
+/// Values so far beyond the tolerance that a linear axis would show nothing but them.
+bool is_wide(const std::vector<double>& values, double tau_px);
+
 /// "1 hole", "2 holes", "no hole".
 std::string counted(std::int64_t count, const std::string& one, const std::string& many);
 

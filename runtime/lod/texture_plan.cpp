@@ -112,8 +112,10 @@ bool TexturePlan::place(const Cut& cut, std::int32_t leaf, double fade_s, DrawIt
     item.texture.slot = -1;
     std::int32_t index = leaf;
     for (int step = wanted_steps_up(own); step > 0; --step) rise(index);
-    const CutNode& wanted = nodes[static_cast<std::size_t>(index)];
-    const bool sharp = !wanted.textured || wanted.texture_slot != kNotResident || !residency_->has_textures;
+    // Where textures end above, the last of them is all that can be wanted.
+    while (index >= 0 && !nodes[static_cast<std::size_t>(index)].textured) rise(index);
+    const bool sharp =
+        !residency_->has_textures || index < 0 || nodes[static_cast<std::size_t>(index)].texture_slot != kNotResident;
     if (!resident(index)) return sharp;
     item.texture = placed(index);
     const CutNode& chosen = nodes[static_cast<std::size_t>(index)];

@@ -333,6 +333,8 @@ std::string drawn(const BarChart& chart, const Form& form) {
     sheet.y_axis(y, chart.y.label);
     const double group_px =
         (sheet.right() - sheet.left()) / static_cast<double>(std::max<std::size_t>(1, chart.groups.size()));
+    double widest_px = 0;
+    for (const std::string& group : chart.groups) widest_px = std::max(widest_px, 1.5 * text_px(group));
     const double bar_px = 0.8 * group_px / static_cast<double>(std::max<std::size_t>(1, chart.series.size()));
     const double base = chart.y.logarithmic || !y.can_show(0) ? sheet.bottom() : sheet.y(y.share(0));
     for (std::size_t g = 0; g < chart.groups.size(); ++g) {
@@ -344,7 +346,8 @@ std::string drawn(const BarChart& chart, const Form& form) {
             sheet.bar(k, middle - 0.4 * group_px + static_cast<double>(k) * bar_px, std::min(at, base), 0.92 * bar_px,
                       std::abs(base - at));
         }
-        const bool crowded = text_px(chart.groups[g]) > group_px;
+        // A page's text is larger where the screen is narrow; there all names turn alike.
+        const bool crowded = form.in_page ? widest_px > group_px : text_px(chart.groups[g]) > group_px;
         sheet.text(middle, sheet.bottom() + (crowded ? 14 : 18), chart.groups[g], "t", crowded ? "end" : "middle",
                    crowded ? -25 : 0);
     }
