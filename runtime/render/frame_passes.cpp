@@ -95,8 +95,8 @@ void EdgePass::begin(const Camera& camera, const RelativeFrame& frame, const Lat
     set_position(program, camera, frame);
     set_atmosphere(program, camera, settings);
     glProgramUniform4f(program, shader::kBoxUniform, static_cast<float>(lattice.x_m(0) - camera.eye.x),
-                       static_cast<float>(lattice.y_m(lattice.cells_y) - camera.eye.y),
-                       static_cast<float>(lattice.x_m(lattice.cells_x) - camera.eye.x),
+                       static_cast<float>(lattice.y_m(static_cast<double>(lattice.cells_y)) - camera.eye.y),
+                       static_cast<float>(lattice.x_m(static_cast<double>(lattice.cells_x)) - camera.eye.x),
                        static_cast<float>(lattice.y_m(0) - camera.eye.y));
     glProgramUniform1f(program, shader::kBandUniform, static_cast<float>(1 / settings.edge_band_m));
     glUseProgram(program);

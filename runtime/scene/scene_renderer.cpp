@@ -23,7 +23,7 @@ RendererOptions options_of(const Dataset& d, const MemoryPlan& plan, double anis
 FrameSettings scenery(const Dataset& d) {
     FrameSettings s;
     const double extent = static_cast<double>(std::max(d.lattice.cells_x, d.lattice.cells_y)) * d.lattice.spacing_m;
-    s.haze_distance_m = 1.6 * extent;
+    s.haze_distance_m = 2.2 * extent;
     s.haze_scale_height_m = std::max(0.08 * extent, d.max_height_m - d.min_height_m);
     s.edge_band_m = 0.015 * extent;
     s.ground_height_m = d.min_height_m;

@@ -9,7 +9,7 @@ layout(location = kHazeUniform) uniform vec4 haze;
 
 const vec3 kZenith = vec3(0.040, 0.150, 0.460);
 const vec3 kHorizon = vec3(0.590, 0.690, 0.790);
-const vec3 kGround = vec3(0.085, 0.130, 0.170);
+const vec3 kGround = vec3(0.050, 0.082, 0.112);
 const vec3 kSunlight = vec3(1.000, 0.860, 0.640);
 
 // Plain multiplications stand in for pow() and exp(): on software OpenGL the sky costs what it computes.
@@ -51,7 +51,8 @@ vec3 sky_colour(vec3 direction) {
     if (direction.z < 0.0) {
         float depth = (1.0 - haze.w) * haze.x / (haze.y * max(-direction.z, 1e-6));
         // As still water would, the plane mirrors the sky the more the flatter it is seen.
-        vec3 ground = mix(kGround, horizon, 0.55 * fourth_power(1.0 + direction.z));
+        float flat_seen = 1.0 + direction.z;
+        vec3 ground = mix(kGround, horizon, 0.85 * flat_seen * flat_seen * flat_seen);
         return mix(horizon, ground, exp(-depth));
     }
     float near_sun = fourth_power(fourth_power(towards));         // ^16

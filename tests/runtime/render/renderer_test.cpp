@@ -443,6 +443,49 @@ TEST_F(RendererTest, HazeFadesFarGroundIntoTheHorizon) {
     EXPECT_NEAR(thick[1], 215, 12);  // the horizon's colour, whatever the ground's
 }
 
+// From above the world fills the picture but for a margin; its outer 32 m of 320 dissolve.
+TEST_F(RendererTest, TheEndOfTheDataDissolvesIntoTheSky) {
+    make_small();
+    renderer_->upload_texture(0, plain_texture(kTextureLog2, kGreen565));
+    const Camera camera = from_above(420);
+    FrameSettings settings;
+    settings.haze_distance_m = 5'000;
+    const Picture sky = draw(camera, {}, settings), hard = draw(camera, {DrawItem{}}, settings);
+    settings.edge_band_m = 32;
+    std::vector<DrawItem> quarters(4);
+    for (int k = 0; k < 4; ++k) quarters[static_cast<std::size_t>(k)].tile = child_of({0, 0, 0}, k);
+    quarters[2].neighbour_textures[0] = 1;  // drawn as a ring and an inner part
+    for (const auto& items : {std::vector{DrawItem{}}, quarters})
+        for (const int samples : {0, 4}) {
+            const Picture soft = draw(camera, items, settings, samples);
+            EXPECT_GT(soft.times.edge_draws, 0u);
+            const double m_per_px = 2 * std::tan(glm::radians(22.5)) * 420 / kSize_px;
+            double last_share = -1;
+            for (int x = 0; x < kSize_px / 2; ++x) {
+                const double inside_m = 160 - (kSize_px / 2 - x - 0.5) * m_per_px;
+                for (const auto& [px, py] : {std::pair{x, 48}, std::pair{kSize_px - 1 - x, 40}, std::pair{40, x},
+                                             std::pair{60, kSize_px - 1 - x}}) {
+                    if (inside_m > 34) {
+                        EXPECT_EQ(soft.at(px, py), hard.at(px, py)) << px << ' ' << py;
+                    }
+                    if (inside_m < 2) {
+                        for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(soft.at(px, py)[c], sky.at(px, py)[c], 3);
+                    }
+                }
+                const double share = (soft.at(x, 48)[1] - sky.at(x, 48)[1]) /
+                                     static_cast<double>(hard.at(48, 48)[1] - sky.at(48, 48)[1]);
+                EXPECT_GE(share, last_share - 0.03) << x;
+                last_share = share;
+            }
+            EXPECT_GT(last_share, 0.95);
+        }
+    settings.magenta_background = true;
+    const Picture magenta = draw(camera, {DrawItem{}}, settings);
+    EXPECT_EQ(magenta.times.edge_draws, 0u);
+    settings.edge_band_m = 0;
+    EXPECT_EQ(magenta.rgb, draw(camera, {DrawItem{}}, settings).rgb);
+}
+
 TEST_F(RendererTest, DebugViewsDrawWhatTheySay) {
     make_small();
     renderer_->upload_texture(0, plain_texture(kTextureLog2, kGreen565));

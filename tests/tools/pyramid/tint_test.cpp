@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
 #include <vector>
 
 #include "tests/common/test_support.h"
@@ -12,7 +15,7 @@ namespace {
 std::vector<std::uint8_t> tinted(const std::vector<double>& upper, const std::vector<double>& lower,
                                  const TintOptions& o) {
     std::vector<std::uint8_t> out((upper.size() - 1) * 4);
-    tint_row(upper, lower, o, out);
+    Tint(o).row(upper, lower, out);
     return out;
 }
 
@@ -38,6 +41,27 @@ TEST(Tint, SlopesTowardsTheLightAreBrighter) {
         EXPECT_GT(lit[c], flat[c]);
         EXPECT_GT(flat[c], dark[c]);
     }
+}
+
+// The mean of the four sides' light is that of flat ground, so that no ridge is lost whichever way it runs.
+TEST(Tint, SlopesOfEveryAspectDifferFromFlatGroundOrFromTheirOpposite) {
+    const TintOptions o{0, 1000, 10};
+    const int flat = tinted({500, 500}, {500, 500}, o)[1];
+    for (int aspect = 0; aspect < 16; ++aspect) {
+        const double angle = aspect * 0.39269908169872414, dx = 3 * std::cos(angle), dy = 3 * std::sin(angle);
+        const auto slope = [&](double sign) {
+            return int{tinted({500 + sign * (dy - dx), 500 + sign * (dy + dx)},
+                              {500 + sign * (-dy - dx), 500 + sign * (-dy + dx)}, o)[1]};
+        };
+        EXPECT_GT(std::abs(slope(1) - flat) + std::abs(slope(-1) - flat), 12) << aspect;
+        EXPECT_GT(std::min(slope(1), slope(-1)), 40) << "no slope lies in the dark, " << aspect;
+    }
+}
+
+TEST(Tint, LitSlopesAreWarmerThanShadedOnes) {
+    const TintOptions o{0, 1000, 10};
+    const auto lit = tinted({490, 500}, {500, 510}, o), dark = tinted({510, 500}, {500, 490}, o);
+    EXPECT_GT(lit[0] * dark[2], dark[0] * lit[2]);
 }
 
 TEST(Tint, FlatSeaIsBlueAndFlatLandIsNot) {
