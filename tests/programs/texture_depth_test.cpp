@@ -166,6 +166,20 @@ TEST_F(TextureDepths, TilesEndWhereTheirImagesDo) {
     EXPECT_NE(told.find("depth varies by place"), std::string::npos) << told;
 }
 
+TEST_F(TextureDepths, TakeLittleMoreThanTheirImagesApart) {
+    const std::string base = image("base.tif", 1025, 1025, 0, 0, 10, 0),
+                      fine = image("fine.tif", 1024, 1024, 3203, 4101, 10.0 / 32, 90);
+    const auto both = build({dem(1025, 1025, 4, false), "--imagery", base, fine}, store_);
+    const auto below = build({folder_.file("dem.tif"), "--imagery", base}, whole_);
+    // The inset's part of the land, cut by its samples.
+    HeightGrid grid = hills(34, 34, 4);
+    write_heights(folder_.file("part.tif"), grid, {kWest + 3200, kNorth - 4100});
+    const auto above = build({folder_.file("part.tif"), "--imagery", fine}, whole_);
+    for (const char* what : {"texture_tiles", "store_bytes"})
+        EXPECT_LE(both[what].get<double>(), 1.1 * (below[what].get<double>() + above[what].get<double>())) << what;
+    EXPECT_GT(both["texture_tiles"].get<double>(), above["texture_tiles"].get<double>());
+}
+
 TEST_F(TextureDepths, ImagesOfOneResolutionOverAllOfTheLandAreStoredAsEver) {
     const std::string land = dem(120, 90, 4);
     build({land, "--imagery", image("a.tif", 300, 400, 0, 0, 2.5, 0), image("b.tif", 300, 400, 600, 0, 2.5, 9)},
