@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <csignal>
+#include <functional>
 #include <map>
 #include <optional>
 #include <set>
@@ -164,6 +165,20 @@ TEST_F(TextureDepths, TilesEndWhereTheirImagesDo) {
     EXPECT_EQ(info["texture_tiles_of_level"], nlohmann::json(of_level));
     const std::string told = scree({"info", store_}).out;
     EXPECT_NE(told.find("depth varies by place"), std::string::npos) << told;
+}
+
+TEST_F(TextureDepths, TakeLittleMoreThanTheirImagesApart) {
+    const std::string base = image("base.tif", 1025, 1025, 0, 0, 10, 0),
+                      fine = image("fine.tif", 1024, 1024, 3203, 4101, 10.0 / 32, 90);
+    const auto both = build({dem(1025, 1025, 4, false), "--imagery", base, fine}, store_);
+    const auto below = build({folder_.file("dem.tif"), "--imagery", base}, whole_);
+    // The inset's part of the land, cut by its samples.
+    HeightGrid grid = hills(34, 34, 4);
+    write_heights(folder_.file("part.tif"), grid, {kWest + 3200, kNorth - 4100});
+    const auto above = build({folder_.file("part.tif"), "--imagery", fine}, whole_);
+    for (const char* what : {"texture_tiles", "store_bytes"})
+        EXPECT_LE(both[what].get<double>(), 1.1 * (below[what].get<double>() + above[what].get<double>())) << what;
+    EXPECT_GT(both["texture_tiles"].get<double>(), above["texture_tiles"].get<double>());
 }
 
 TEST_F(TextureDepths, ImagesOfOneResolutionOverAllOfTheLandAreStoredAsEver) {
@@ -368,6 +383,40 @@ TEST_F(TextureDepths, AnUpdateOfAnInsetLeavesOtherDeepDistrictsAlone) {
                      "--imagery", west}));
     build({land, "--imagery", base, west}, whole_);
     EXPECT_EQ(digest_of(store_), digest_of(whole_));
+}
+
+TEST_F(TextureDepths, VerifyNoticesALostDeepSeedAndAWrongEnd) {
+    const List inputs{dem(65, 65, 3, false), "--imagery", image("base.tif", 65, 65, 0, 0, 10, 0),
+                      image("fine.tif", 60, 60, 100, 100, 0.3, 90)};
+    const auto damaged = [&](const std::function<void(SqliteStoreWriter&, const Dataset&)>& damage) {
+        build(inputs, store_);
+        Dataset d;
+        texture_tiles(store_, d);
+        {
+            auto writer = SqliteStoreWriter::amend(store_);
+            ASSERT_TRUE(writer.ok());
+            damage(**writer, d);
+            ASSERT_TRUE((*writer)->finish(d).ok());
+        }
+        const auto verified = scree({"verify", store_, "--quiet"});
+        EXPECT_EQ(verified.exit_code, 1) << describe(verified);
+    };
+    damaged([](SqliteStoreWriter& writer, const Dataset& d) {
+        std::vector<std::int64_t> deep;
+        const auto ok = writer.for_each_key(TileKind::seed, [&](std::int64_t key) {
+            if (tile_from_key(d.lattice, key)->level == d.coarsest_texture_level) deep.push_back(key);
+        });
+        EXPECT_TRUE(ok.ok());
+        ASSERT_FALSE(deep.empty());
+        EXPECT_TRUE(writer.remove(TileKind::seed, deep[0]).ok());
+    });
+    damaged([](SqliteStoreWriter& writer, const Dataset&) {
+        TileRow row;
+        const auto found = writer.read(TileKind::height, 1, row);
+        ASSERT_TRUE(found.ok() && *found);
+        row.payload[1] = static_cast<std::uint8_t>(row.payload[1] ^ 2);
+        EXPECT_TRUE(writer.put(TileKind::height, 1, row.codec, row.payload).ok());
+    });
 }
 
 TEST_F(TextureDepths, MemoryIsBoundedHoweverWideAndDeep) {
