@@ -111,7 +111,7 @@ std::string frame_table(const AuditResult& r, const AuditFacts& facts) {
 std::string settings_table(const AuditFacts& f) {
     std::vector<std::vector<std::string>> rows{
         {"tolerance", fmt::format("{:g} px", f.tau_px), "how far anything drawn may be from the finest data"},
-        {"budget", fmt::format("{} MB", megabytes(f.budget_bytes)), "for tiles"},
+        {"budget", fmt::format("{} MB", page_megabytes(f.budget_bytes)), "for tiles"},
         {"method", fmt::format("<code>{}</code>", escaped(f.lod)),
          f.guaranteed ? "its error is promised" : "its error is not promised beforehand"},
         {"poses", f.moving ? "moving" : "settled",

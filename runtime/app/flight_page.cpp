@@ -65,7 +65,7 @@ std::string charts(const FlightLog& log, const FlightFacts& facts) {
                                    {{"heights", scaled(log.of(&FlightFrame::resident_heights_bytes), kMega)},
                                     {"textures", scaled(log.of(&FlightFrame::resident_textures_bytes), kMega)}});
     const double budget_mb = static_cast<double>(facts.budget_bytes) / kMega;
-    memory.levels.push_back({fmt::format("budget {} MB", megabytes(facts.budget_bytes)), budget_mb});
+    memory.levels.push_back({fmt::format("budget {} MB", page_megabytes(facts.budget_bytes)), budget_mb});
     html += to_figure(memory);
 
     html += to_figure(frame_chart("Waiting", "tiles",
@@ -108,8 +108,8 @@ std::string settings_table(const FlightFacts& f) {
         {"setting", "value", "meaning"},
         Rows{{"tolerance", fmt::format("{:g} px", f.tau_px), "how far anything drawn may be from the finest data"},
              {"texture tolerance", fmt::format("{:g} px", f.texture_tau_px), "pixels that a texel may cover"},
-             {"budget", fmt::format("{} MB", megabytes(f.budget_bytes)),
-              fmt::format("for tiles; divided beforehand, {} MB of it taken", megabytes(f.peak_resident_bytes))},
+             {"budget", fmt::format("{} MB", page_megabytes(f.budget_bytes)),
+              fmt::format("for tiles; divided beforehand, {} MB of it taken", page_megabytes(f.peak_resident_bytes))},
              {"method", fmt::format("<code>{}</code>", escaped(f.lod)),
               f.guaranteed ? "its error is promised" : "its error is not promised beforehand"},
              {"picture", fmt::format("{} x {}, {:g} degrees", f.width_px, f.height_px, f.fov_deg),
@@ -148,12 +148,12 @@ std::string whole_table(const FlightLog& log, const FlightFacts& f) {
               {"holes, cells", fmt::format("{}", log.total(&FlightFrame::holes))},
               {"tiles that came, of these ahead of need", fmt::format("{}, {}", c.tiles_paged_in, c.prefetched)},
               {"tiles that went", fmt::format("{}", c.tiles_paged_out)},
-              {"read, MB", megabytes(c.bytes_read)},
-              {"uploaded, MB", megabytes(c.upload_bytes)},
+              {"read, MB", page_megabytes(c.bytes_read)},
+              {"uploaded, MB", page_megabytes(c.upload_bytes)},
               {"damaged tiles", fmt::format("{}", c.damaged_tiles)},
-              {"tiles in memory at most, MB", megabytes(log.most_resident_bytes())},
-              {"process at most, MB", megabytes(f.peak_rss_bytes)},
-              {"of which not for tiles, MB", megabytes(log.fixed_rss_bytes)},
+              {"tiles in memory at most, MB", page_megabytes(log.most_resident_bytes())},
+              {"process at most, MB", page_megabytes(f.peak_rss_bytes)},
+              {"of which not for tiles, MB", page_megabytes(log.fixed_rss_bytes)},
               {"first picture within 8 px, ms", short_number(log.coarse_after_ms)},
               {"first picture within the tolerance, ms", short_number(log.true_after_ms)}};
     if (f.store_updates > 0) rows.push_back({"updates of the store taken up", fmt::format("{}", f.store_updates)});

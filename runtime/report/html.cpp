@@ -130,7 +130,7 @@ std::string tick_number(double v) {
     return fmt::format("{:g}", v);
 }
 
-std::string megabytes(std::int64_t bytes) { return fmt::format("{:.1f}", static_cast<double>(bytes) / 1e6); }
+std::string page_megabytes(std::int64_t bytes) { return fmt::format("{:.1f}", static_cast<double>(bytes) / 1e6); }
 
 std::string shell_quoted(const std::string& word) {
     const bool plain = !word.empty() && word.find_first_not_of(
