@@ -165,6 +165,9 @@ Result<void> Dataset::check() const {
                                        *coarsest_leaf_level, lattice.deepest_level));
     if (geo_grid)
         if (auto ok = geo_grid->check(); !ok) return store_error("dataset: " + ok.error().message);
+    if (coarsest_texture_level && (*coarsest_texture_level < 0 || *coarsest_texture_level >= texture_deepest_level))
+        return store_error(fmt::format("dataset: coarsest texture level {} is not above the deepest level {}",
+                                       *coarsest_texture_level, texture_deepest_level));
     if (height_tiles < 1 || texture_tiles < 1 || present_cells < 1)
         return store_error("dataset: a store holds at least one tile of each kind and one present cell");
     return {};
@@ -208,6 +211,7 @@ std::string dataset_to_json(const Dataset& d) {
                  {"attribution", d.attribution}};
     if (d.coarsest_leaf_level) json["coarsest_leaf_level"] = *d.coarsest_leaf_level;
     if (d.geo_grid) json["geo_grid"] = to_json(*d.geo_grid);
+    if (d.coarsest_texture_level) json["coarsest_texture_level"] = *d.coarsest_texture_level;
     if (!d.options.empty()) json["options"] = d.options;
     return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
@@ -243,6 +247,8 @@ Result<Dataset> dataset_from_json(const std::string& text) {
     if (json.contains("coarsest_leaf_level")) fields.read("coarsest_leaf_level", d.coarsest_leaf_level.emplace());
     fields.read("texture_size_log2", d.texture_size_log2);
     fields.read("texture_deepest_level", d.texture_deepest_level);
+    if (json.contains("coarsest_texture_level"))
+        fields.read("coarsest_texture_level", d.coarsest_texture_level.emplace());
     fields.read("has_imagery", d.has_imagery);
     fields.read("height_tiles", d.height_tiles);
     fields.read("texture_tiles", d.texture_tiles);

@@ -49,6 +49,9 @@ struct Dataset {
 
     int texture_size_log2 = 8;
     int texture_deepest_level = 0;
+    /// Level of the coarsest textures that are not refined, where that is not the deepest one: their depth varies by
+    /// place.
+    std::optional<int> coarsest_texture_level;
     bool has_imagery = false;  ///< false: a tint made from the heights
 
     std::int64_t height_tiles = 0;
@@ -74,6 +77,8 @@ struct Dataset {
     int deepest_level() const;
     /// Level of the coarsest leaf of the heights.
     int least_leaf_level() const { return coarsest_leaf_level.value_or(lattice.deepest_level); }
+    /// Level down to which every texture is refined.
+    int least_texture_level() const { return coarsest_texture_level.value_or(texture_deepest_level); }
     double height_m(double n) const { return height_offset_m + n * height_quantum_m; }
 
     /// Heights, their quantum and their errors times `factor`: all that is in metres of height. Errors:

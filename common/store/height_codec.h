@@ -16,7 +16,17 @@ enum class HeightCodec : int {
     plane = 1  ///< plane predictor, zigzag, byte planes, Zstandard
 };
 
-/// `tile.samples` must hold (2^n + 1)^2 values within kMaxHeightUnits (asserted: the builder made them).
+struct NamedHeightCodec {
+    HeightCodec codec;
+    const char* name;    ///< as `scree build --height-codec` takes it
+    int bytes_a_sample;  ///< what terrain stays below, for estimates
+};
+/// All of them by number, read from the one table (height_codec.cpp). What is to hold for each goes through this.
+std::span<const NamedHeightCodec> height_codecs();
+inline const NamedHeightCodec& named(HeightCodec codec) { return height_codecs()[static_cast<std::size_t>(codec)]; }
+
+/// `codec` must be one of height_codecs(), `tile.samples` must hold (2^n + 1)^2 values within kMaxHeightUnits
+/// (asserted: the builder made them).
 std::vector<std::uint8_t> encode_height_tile(const HeightTile& tile, int tile_cells_log2, HeightCodec codec);
 
 /// Errors: ErrorCode::store for any payload that is not exactly one well-formed tile: truncated, too long, counts or
@@ -32,5 +42,9 @@ struct HeightMarks {
     bool some_absent = false;  ///< a leaf with absent cells
 };
 std::optional<HeightMarks> height_marks(std::span<const std::uint8_t> payload);
+
+/// Says in a payload, of any codec, where textures end: at the tile itself, and at its children (bit q: child q; those
+/// that are not stored are left out). False: it is too short to be a payload.
+bool set_texture_ends(std::span<std::uint8_t> payload, bool own, std::uint8_t children);
 
 }  // namespace scree

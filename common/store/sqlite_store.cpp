@@ -161,6 +161,15 @@ Result<SqliteStore::Contents> SqliteStore::contents() const {
     };
     if (auto ok = read("height", contents.height_rows, contents.height_bytes); !ok) return ok.error();
     if (auto ok = read("texture", contents.texture_rows, contents.texture_bytes); !ok) return ok.error();
+    const Lattice& l = dataset_.lattice;
+    for (int level = 0; level <= dataset_.texture_deepest_level; ++level) {
+        const std::int64_t first = (std::int64_t{1} << (2 * level)) * l.root_rows * l.root_columns;
+        auto rows = query_integer(
+            path_, db->get(),
+            fmt::format("SELECT count(*) FROM texture WHERE key BETWEEN {} AND {}", first, first + (first - 1)));
+        if (!rows) return rows.error();
+        contents.texture_rows_of_level.push_back(*rows);
+    }
     auto seeds = has_seeds(path_, db->get());
     if (!seeds) return seeds.error();
     if (*seeds)

@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "common/store/tile_store.h"
 
@@ -48,6 +49,7 @@ public:
         std::int64_t height_rows = 0, texture_rows = 0, seed_rows = 0;
         std::int64_t height_bytes = 0, texture_bytes = 0, seed_bytes = 0;  ///< payloads
         std::int64_t file_bytes = 0;
+        std::vector<std::int64_t> texture_rows_of_level;  ///< from level 0 to the textures' deepest
     };
     Result<Contents> contents() const;
     /// SQLite's own structural check; empty text when sound.

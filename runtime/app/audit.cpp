@@ -75,8 +75,19 @@ void ErrorHistogram::add(double px) {
     ++count_;
     sum_ += px;
     max_ = std::max(max_, px);
+    ++bins_[bin_of(px)];
+}
+
+std::size_t ErrorHistogram::bin_of(double px) {
     const double bin = px <= kFirstBinPx ? 0 : 1 + std::log(px / kFirstBinPx) / std::log(kBinRatio);
-    ++bins_[bin < kBins - 1 ? static_cast<std::size_t>(bin) : static_cast<std::size_t>(kBins - 1)];
+    return bin < kBins - 1 ? static_cast<std::size_t>(bin) : static_cast<std::size_t>(kBins - 1);
+}
+
+std::int64_t ErrorHistogram::count_within(double px) const {
+    if (px >= max_) return count_;
+    std::int64_t count = 0;
+    for (std::size_t k = 0; k <= bin_of(px); ++k) count += bins_[k];
+    return count;
 }
 
 void ErrorHistogram::merge(const ErrorHistogram& other) {

@@ -25,8 +25,11 @@ public:
     double mean() const { return count_ > 0 ? sum_ / static_cast<double>(count_) : 0; }
     /// Upper end of the bin that holds the quantile; bins are 0.4 % wide.
     double quantile(double q) const;
+    /// Errors of at most so many pixels, as far as the bins tell: those of the bin that holds `px` are counted.
+    std::int64_t count_within(double px) const;
 
 private:
+    static std::size_t bin_of(double px);
     static constexpr int kBins = 8192;
     std::array<std::int64_t, kBins> bins_{};
     std::int64_t count_ = 0;

@@ -1,15 +1,20 @@
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
+#include <filesystem>
 
 #include "common/cli/arguments.h"
 #include "common/report.h"
 #include "runtime/app/audit.h"
+#include "runtime/app/audit_page.h"
+#include "runtime/app/audit_result.h"
 #include "runtime/app/block_commands.h"
 #include "runtime/app/commands.h"
 #include "runtime/app/coverage.h"
+#include "runtime/app/pose_pictures.h"
 #include "runtime/app/source_samples.h"
 #include "runtime/app/view_options.h"
+#include "runtime/report/machine.h"
+#include "runtime/report/report_folder.h"
 
 namespace scree {
 namespace {
@@ -24,19 +29,9 @@ struct AuditOptions {
     bool moving = false;
     std::vector<std::string> against;
     SamplingOptions sampling;
-};
-
-struct AuditResult {
-    ErrorHistogram errors;
-    CrackReport cracks;
-    double max_bound_px = 0;
-    double worst_share = 0;  ///< greatest true error of a frame over what the frame promised
-    bool kept = true;
-    std::int64_t holes = 0, limited = 0, stand_ins = 0;
-    int frames = 0;
-    ErrorHistogram source_errors;
-    double source_excess_px = 0;
-    std::int64_t samples_not_drawn = 0;
+    std::string report;
+    bool force = false;
+    std::string command;  ///< as it was typed
 };
 
 struct Audit {
@@ -53,7 +48,7 @@ struct Audit {
     // What is drawn from one pose: settled, or as a flight would have it by now.
     Result<SceneFrame> frame_at(const Camera& camera) {
         if (!audit.moving) return scene.complete({&camera, 1}, [] { return interrupt_flag().load(); });
-        return scene.advance({&camera, 1}, kFrame_s * result.frames);
+        return scene.advance({&camera, 1}, kFrame_s * static_cast<double>(result.frames.size()));
     }
 
     Result<void> look(const Camera& camera) {
@@ -70,11 +65,15 @@ struct Audit {
         result.kept = result.kept && errors.max() <= promised_px;
         result.worst_share = std::max(result.worst_share, errors.max() / promised_px);
         result.errors.merge(errors);
+        AuditFrame noted;
         for (const SourceJudge& source : sources) {
             double excess_px = 0;
-            auto ok = audit_against(d, source, audited, d.warp_error_m + d.height_quantum_error_m, result.source_errors,
-                                    excess_px);
+            ErrorHistogram source_errors;
+            auto ok =
+                audit_against(d, source, audited, d.warp_error_m + d.height_quantum_error_m, source_errors, excess_px);
             if (!ok) return ok;
+            result.source_errors.merge(source_errors);
+            noted.source_max_px = std::max(noted.source_max_px, source_errors.max());
             result.kept = result.kept && excess_px <= promised_px;
             result.source_excess_px = std::max(result.source_excess_px, excess_px);
         }
@@ -82,19 +81,29 @@ struct Audit {
         result.cracks.edges += cracks.edges;
         result.cracks.open_edges += cracks.open_edges;
         result.cracks.t_junctions += cracks.t_junctions;
-        result.holes += count_holes(d, scene.pager().residency(), camera, draws, frame->half_curvature);
+        noted.holes = count_holes(d, scene.pager().residency(), camera, draws, frame->half_curvature);
+        result.holes += noted.holes;
         result.max_bound_px = std::max(result.max_bound_px, s.max_bound_px);
         result.limited += s.budget_limited ? 1 : 0;
         result.stand_ins += frame->stand_ins ? 1 : 0;
-        ++result.frames;
+        noted.triangles = s.triangles;
+        noted.samples = errors.count();
+        noted.promised_px = promised_px;
+        noted.max_px = errors.max();
+        noted.p99_px = errors.quantile(0.99);
+        noted.mean_px = errors.mean();
+        noted.open_edges = cracks.open_edges;
+        noted.t_junctions = cracks.t_junctions;
+        noted.limited = s.budget_limited;
+        noted.incomplete = frame->stand_ins;
+        result.frames.push_back(noted);
         return {};
     }
 };
 
-Result<AuditResult> audit(const ViewOptions& o, const AuditOptions& a) {
-    auto store = open_store(o);
-    if (!store) return store.error();
-    const Dataset& d = (*store)->dataset();
+Result<AuditResult> audit(const ViewOptions& o, const AuditOptions& a, const SqliteStore& store,
+                          const FlightPath& path) {
+    const Dataset& d = store.dataset();
     std::optional<SourceSamples> sources;
     if (!a.against.empty()) {
         SamplingOptions sampling = a.sampling;
@@ -107,16 +116,14 @@ Result<AuditResult> audit(const ViewOptions& o, const AuditOptions& a) {
     }
     SceneOptions options = scene_options(o);
     options.textures = false;  // pages are chosen as with them, but nothing is looked at
-    auto scene = Scene::open(**store, options);
+    auto scene = Scene::open(store, options);
     if (!scene) return scene.error();
-    auto path = flight_of(**store, o, a.frames);
-    if (!path) return path.error();
     CpuArena arena(d, (*scene)->memory().height_slots);
     if (auto ok = (*scene)->start(arena); !ok) return ok.error();
-    auto reader = (*store)->open_reader();
+    auto reader = store.open_reader();
     if (!reader) return reader.error();
     const TilePatterns patterns(d.lattice.tile_cells_log2);
-    Audit audit{o, a, **store, **scene, arena, **reader, patterns, {}, {}};
+    Audit audit{o, a, store, **scene, arena, **reader, patterns, {}, {}};
     if (sources)
         for (const SourceLayer& layer : sources->layers()) {
             auto judge = SourceJudge::make(d, **reader, layer);
@@ -124,7 +131,7 @@ Result<AuditResult> audit(const ViewOptions& o, const AuditOptions& a) {
             audit.result.samples_not_drawn += judge->not_drawn();
             audit.sources.push_back(std::move(*judge));
         }
-    for (const FlightPose& pose : *path) {
+    for (const FlightPose& pose : path) {
         if (interrupt_flag()) return Error{ErrorCode::interrupted, "stopped"};
         auto camera = camera_of(pose, o);
         if (!camera) return camera.error();
@@ -139,53 +146,52 @@ Result<AuditResult> audit(const ViewOptions& o, const AuditOptions& a) {
     return std::move(r);
 }
 
-nlohmann::ordered_json report_of(const AuditResult& r, const ViewOptions& o, const AuditOptions& a) {
-    nlohmann::ordered_json report = {{"frames", r.frames},
-                                     {"tau_px", o.tau_px},
-                                     {"max_error_px", r.errors.max()},
-                                     {"p99_error_px", r.errors.quantile(0.99)},
-                                     {"mean_error_px", r.errors.mean()},
-                                     {"max_bound_px", r.max_bound_px},
-                                     {"worst_share_of_promise", r.worst_share},
-                                     {"open_edges", r.cracks.open_edges},
-                                     {"t_junctions", r.cracks.t_junctions},
-                                     {"samples", r.errors.count()},
-                                     {"holes", r.holes},
-                                     {"budget_limited_frames", r.limited},
-                                     {"frames_with_stand_ins", r.stand_ins},
-                                     {"guaranteed", o.lod.is_guaranteed()},
-                                     {"lod", command_line_of(o.lod)},
-                                     {"kept", r.kept}};
-    if (!a.against.empty())
-        report["against"] = {{"sources", a.against.size()},
-                             {"samples", r.source_errors.count()},
-                             {"samples_not_drawn", r.samples_not_drawn},
-                             {"max_error_px", r.source_errors.max()},
-                             {"p99_error_px", r.source_errors.quantile(0.99)},
-                             {"mean_error_px", r.source_errors.mean()},
-                             {"max_error_less_stated_px", r.source_excess_px}};
-    return report;
+AuditFacts facts_of(const Dataset& d, const ViewOptions& o, const AuditOptions& a) {
+    AuditFacts facts;
+    facts.store = std::filesystem::path(o.store).filename().string();
+    facts.command = a.command;
+    facts.machine = machine_name();
+    facts.lod = command_line_of(o.lod);
+    facts.guaranteed = o.lod.is_guaranteed();
+    facts.moving = a.moving;
+    facts.tau_px = o.tau_px;
+    facts.fov_deg = o.fov_deg;
+    facts.width_px = o.width_px;
+    facts.height_px = o.height_px;
+    facts.budget_bytes = o.budget_bytes;
+    facts.height_quantum_error_m = d.height_quantum_error_m;
+    facts.warp_error_m = d.warp_error_m;
+    for (const std::string& source : a.against) {
+        const std::filesystem::path named = std::filesystem::path(source).lexically_normal();
+        facts.sources.push_back((named.has_filename() ? named : named.parent_path()).filename().string());
+    }
+    return facts;
 }
 
-void print(const AuditResult& r, const ViewOptions& o, const AuditOptions& a) {
-    fmt::print("{} frames, {} samples: error max {:.4f} px, p99 {:.4f}, mean {:.5f}; promised {:.4f} at tau {}\n",
-               r.frames, r.errors.count(), r.errors.max(), r.errors.quantile(0.99), r.errors.mean(), r.max_bound_px,
-               o.tau_px);
-    if (!a.against.empty())
-        fmt::print(
-            "against the sources, {} samples: error max {:.4f} px, p99 {:.4f}, mean {:.5f}; {:.4f} px beyond what the "
-            "store states of its heights; {} samples over no terrain\n",
-            r.source_errors.count(), r.source_errors.max(), r.source_errors.quantile(0.99), r.source_errors.mean(),
-            r.source_excess_px, r.samples_not_drawn);
-    fmt::print("{} open edges, {} T-junctions, {} holes{}: {}\n", r.cracks.open_edges, r.cracks.t_junctions, r.holes,
-               r.limited > 0 ? fmt::format(" ({} frames limited by the budget)", r.limited) : "",
-               !r.kept                 ? "THE PROMISE IS BROKEN"
-               : o.lod.is_guaranteed() ? "the promise holds"
-                                       : "no error is promised");
+Result<ReportFolder> report_folder(const AuditOptions& a) {
+    return ReportFolder::prepare(a.report, {"index.html", "audit.json"}, a.force);
+}
+
+// Without pictures where they cannot be had: the figures stand by themselves.
+Result<void> write_report(const AuditResult& result, const AuditFacts& facts, const ViewOptions& o,
+                          const AuditOptions& a, const SqliteStore& store, const FlightPath& path) {
+    std::string why_none;
+    auto pictures = draw_poses(store, o, path);
+    if (!pictures) {
+        if (pictures.error().code != ErrorCode::display) return pictures.error();
+        why_none = pictures.error().message;
+        note("--report without pictures: {}\n", why_none);
+    }
+    auto page = audit_page(result, facts, pictures ? *pictures : std::vector<PosePicture>{}, why_none);
+    if (!page) return page.error();
+    auto folder = report_folder(a);
+    if (!folder) return folder.error();
+    return folder->write({{"index.html", *page}, {"audit.json", audit_json(result, facts).dump(2) + "\n"}});
 }
 
 Result<bool> run_blocks(const ViewOptions& o, const AuditOptions& a) {
-    for (const auto& [given, option] : {std::pair(a.moving, "--moving"), std::pair(!a.against.empty(), "--against")})
+    for (const auto& [given, option] : {std::pair(a.moving, "--moving"), std::pair(!a.against.empty(), "--against"),
+                                        std::pair(!a.report.empty(), "--report")})
         if (auto ok = refuse_with_blocks(given, option); !ok) return ok.error();
     auto store = open_store(o);
     if (!store) return store.error();
@@ -195,11 +201,20 @@ Result<bool> run_blocks(const ViewOptions& o, const AuditOptions& a) {
 }
 
 Result<bool> run_tiles(const ViewOptions& o, const AuditOptions& a) {
-    auto result = audit(o, a);
+    if (!a.report.empty())
+        if (auto folder = report_folder(a); !folder) return folder.error();
+    auto store = open_store(o);
+    if (!store) return store.error();
+    auto path = flight_of(**store, o, a.frames);
+    if (!path) return path.error();
+    auto result = audit(o, a, **store, *path);
     if (!result) return result.error();
-    if (o.json != "-") print(*result, o, a);
+    const AuditFacts facts = facts_of((*store)->dataset(), o, a);
+    if (!a.report.empty())
+        if (auto ok = write_report(*result, facts, o, a, **store, *path); !ok) return ok.error();
+    if (o.json != "-") fmt::print("{}", audit_text(*result, facts));
     if (!o.json.empty())
-        if (auto ok = write_text(o.json, report_of(*result, o, a).dump(2) + "\n"); !ok) return ok.error();
+        if (auto ok = write_text(o.json, audit_json(*result, facts).dump(2) + "\n"); !ok) return ok.error();
     return result->kept;
 }
 
@@ -229,7 +244,12 @@ int run_audit(int argc, char** argv) {
     app.add_option("--height-scale", a.sampling.height_scale, "As for scree build")->needs(against);
     app.add_option("--height-offset", a.sampling.height_offset_m, "As for scree build")->needs(against);
     app.add_option("--nodata", a.sampling.nodata, "As for scree build")->needs(against);
+    auto* report = app.add_option("--report", a.report,
+                                  "Write a page of charts and pictures, and audit.json, into this new folder")
+                       ->type_name("DIR");
+    app.add_flag("--force", a.force, "Replace an earlier report")->needs(report);
     if (const int code = parse_arguments(app, argc, argv); code >= 0) return code;
+    a.command = typed_command("audit", argc, argv);
     if (auto ok = check_view_options(o); !ok) return report_error("scree-view audit", ok.error());
     install_interrupt_handler();
     a.sampling.stop = &interrupt_flag();

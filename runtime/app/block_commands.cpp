@@ -67,7 +67,7 @@ struct FlightLog {
     std::int64_t drawn = 0, reused = 0, meshes_made = 0, strips_made = 0, holes = 0;
     double max_bound_px = 0;
     std::string csv =
-        "frame,frame_ms,select_ms,triangles,blocks,strips,reused,meshes_made,tau_effective_px,rss_bytes\n";
+        "frame,frame_ms,select_ms,triangles,blocks,strips,reused,meshes_made,tau_effective,rss_bytes\n";
 
     void add(std::size_t k, double ms, const BlockFrame& frame, const BlockScene& scene) {
         frame_ms.add(ms);

@@ -23,7 +23,7 @@ Result<std::unique_ptr<Stage>> BlockStage::create(const ViewOptions& o, std::sha
     auto display = BlockDisplay::create(*stage->scene_, shown);
     if (!display) return display.error();
     stage->display_ = std::move(*display);
-    set_look(o, stage->settings());
+    set_look(o, stage->display_->frame_settings());
     return std::unique_ptr<Stage>(std::move(stage));
 }
 

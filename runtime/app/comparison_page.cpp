@@ -296,7 +296,7 @@ std::string sweep_table(const Comparison& comparison, Sweep sweep) {
         const CaseFigures& f = c.figures;
         rows.push_back({sweep == Sweep::texture ? fmt::format("{:g} px", c.what.texture_tau_px)
                                                 : fmt::format("{} MiB", c.what.budget_bytes >> 20),
-                        megabytes(f.tile_bytes), megabytes(f.resident_bytes), number(f.triangles_mean),
+                        page_megabytes(f.tile_bytes), page_megabytes(f.resident_bytes), number(f.triangles_mean),
                         number(f.frame_ms), number(c.promised_px()), number(f.true_max_px),
                         fmt::format("{:.1f}", f.psnr_db), fmt::format("{:.4f}", f.ssim),
                         fmt::format("{} of {}", f.budget_limited_frames, comparison.frames)});
@@ -319,7 +319,7 @@ std::string all_cases(const Comparison& comparison, const std::vector<Curve>& cu
             row_classes.push_back(promises ? "" : "loose");
             rows.push_back({escaped(c.what.method), fmt::format("{:g}", c.what.tau_px), number(f.triangles_mean),
                             number(f.lod_ms), number(f.lod_cold_ms), number(f.draw_ms), number(f.frame_ms),
-                            number(f.frame_p99_ms), megabytes(f.tile_bytes),
+                            number(f.frame_p99_ms), page_megabytes(f.tile_bytes),
                             promises ? number(c.promised_px()) : "nothing", number(f.true_max_px),
                             number(f.true_p99_px), number(f.true_mean_px), fmt::format("{:.1f}", f.psnr_db),
                             fmt::format("{:.4f}", f.ssim), number(static_cast<double>(f.holes)),

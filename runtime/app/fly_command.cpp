@@ -1,7 +1,8 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
-#include <nlohmann/json.hpp>
+#include <filesystem>
 #include <optional>
 
 #include "common/cli/arguments.h"
@@ -12,10 +13,13 @@
 #include "runtime/app/commands.h"
 #include "runtime/app/coverage.h"
 #include "runtime/app/display.h"
+#include "runtime/app/flight_log.h"
+#include "runtime/app/flight_page.h"
 #include "runtime/app/see_through.h"
 #include "runtime/app/view_options.h"
 #include "runtime/render/png.h"
-#include "runtime/report/statistics.h"
+#include "runtime/report/machine.h"
+#include "runtime/report/report_folder.h"
 #include "runtime/scene/frame_governor.h"
 
 namespace scree {
@@ -49,44 +53,9 @@ struct FlyOptions {
     double tau_most_px = 16;
     std::string csv;
     std::string last_frame;
-};
-
-struct FlightLog {
-    Series frame_ms, select_ms, triangles, tiles, tau, bound, mean_bound, tiles_reused;
-    Series settled_triangles, settled_mean_bound;  // of the same poses, when nothing is missing
-    std::int64_t stand_ins = 0, reused = 0, holes = 0, limited = 0, see_through = 0, looked_through = 0;
-    double coarse_after_ms = 0, true_after_ms = 0;  // from the context on; 0: never
-    std::int64_t fixed_rss_bytes = 0;
-    std::string csv =
-        "frame,frame_ms,select_ms,triangles,tiles_drawn,uploads,requests,stand_ins,holes,max_bound_px,mean_bound_px,"
-        "tau_effective_px,rss_bytes\n";
-
-    void add(int k, double ms, const SceneFrame& frame, std::int64_t frame_holes) {
-        const Selection& s = *frame.selection;
-        frame_ms.add(ms);
-        select_ms.add(frame.select_ms);
-        triangles.add(static_cast<double>(s.triangles));
-        tiles.add(static_cast<double>(s.nodes));
-        tau.add(s.tau_effective_px);
-        bound.add(s.max_bound_px);
-        mean_bound.add(s.mean_bound_px);
-        stand_ins += frame.stand_ins ? 1 : 0;
-        reused += frame.reused ? 1 : 0;
-        limited += s.budget_limited ? 1 : 0;
-        holes += frame_holes;
-        csv += fmt::format("{},{:.3f},{:.4f},{},{},{},{},{},{},{:.4f},{:.4f},{:.4f},{}\n", k, ms, frame.select_ms,
-                           s.triangles, s.nodes, frame.uploads, s.requests.size(), frame.stand_ins ? 1 : 0, frame_holes,
-                           s.max_bound_px, s.mean_bound_px, s.tau_effective_px, resident_bytes());
-    }
-    // Least share of the settled triangles that was drawn while flying, after the coarse and the true first picture; 1
-    // without a settled flight.
-    double least_triangle_share() const {
-        double least = 1;
-        for (std::size_t k = 2; k < settled_triangles.values.size(); ++k)
-            if (settled_triangles.values[k] > 0)
-                least = std::min(least, triangles.values[k] / settled_triangles.values[k]);
-        return least;
-    }
+    std::string report;
+    bool force = false;
+    std::string command;  ///< as it was typed
 };
 
 class Flight {
@@ -96,6 +65,8 @@ public:
 
     Result<FlightLog> fly(const FlightPath& path) {
         if (auto ok = warm_up(); !ok) return ok.error();
+        if (!fly_.report.empty()) pictured_ = pictured_frames(path.size());
+        uploaded_bytes_ = scene_.counters().upload_bytes;
         FrameGovernor governor({fly_.fps > 0 ? 1000 / fly_.fps : 1e9, options_.tau_px, fly_.tau_most_px});
         start_ = Clock::now();
         for (std::size_t k = 0; k < path.size(); ++k) {
@@ -112,6 +83,8 @@ public:
             if (auto ok = settle(path); !ok) return ok.error();
         return std::move(log_);
     }
+    /// With --report: along the flight.
+    const std::vector<PosePicture>& pictures() const { return pictures_; }
 
 private:
     Result<void> warm_up() {
@@ -164,11 +137,45 @@ private:
         if (log_.true_after_ms == 0 && s.max_bound_px <= options_.tau_px * (1 + 1e-9))
             log_.true_after_ms = since_context;
         if (scene_.mesher() != nullptr) log_.tiles_reused.add(scene_.mesher()->counters().reused_share());
-        log_.add(k, ms, *frame,
-                 count_holes(scene_.dataset(), scene_.pager().residency(), camera, s.draws[0], frame->half_curvature));
+        note_frame(ms, *frame, camera);
+        if (std::binary_search(pictured_.begin(), pictured_.end(), static_cast<std::size_t>(k))) take_picture(k);
         if (fly_.see_through)
             if (auto ok = look_through(camera, *frame); !ok) return ok.error();
         return ms;
+    }
+
+    void note_frame(double ms, const SceneFrame& frame, const Camera& camera) {
+        const Selection& s = *frame.selection;
+        const PagerCounters counters = scene_.counters();
+        FlightFrame f;
+        f.frame_ms = ms;
+        f.select_ms = frame.select_ms;
+        f.triangles = s.triangles;
+        f.tiles_drawn = s.nodes;
+        f.uploads = frame.uploads;
+        f.upload_bytes = counters.upload_bytes - uploaded_bytes_;
+        uploaded_bytes_ = counters.upload_bytes;
+        f.requests = static_cast<std::int64_t>(s.requests.size());
+        f.queue = scene_.pager().queue();
+        f.stand_ins = s.stand_ins;
+        f.holes = count_holes(scene_.dataset(), scene_.pager().residency(), camera, s.draws[0], frame.half_curvature);
+        f.max_bound_px = s.max_bound_px;
+        f.mean_bound_px = s.mean_bound_px;
+        f.tau_effective_px = s.tau_effective_px;
+        f.resident_heights_bytes = scene_.tile_bytes(TileKind::height);
+        f.resident_textures_bytes = scene_.tile_bytes(TileKind::texture);
+        f.rss_bytes = resident_bytes();
+        f.bytes_read = counters.bytes_read;
+        f.incomplete = frame.stand_ins;
+        f.growing = s.growing;
+        f.reused = frame.reused;
+        f.limited = s.budget_limited;
+        log_.frames.push_back(f);
+    }
+
+    void take_picture(int k) {
+        const PagePicture drawn{options_.width_px, options_.height_px, display_.target().read_pixels()};
+        pictures_.push_back({static_cast<std::size_t>(k), reduced(drawn, kPictureWidth_px)});
     }
 
     Result<void> look_through(const Camera& camera, const SceneFrame& frame) {
@@ -217,88 +224,51 @@ private:
     Clock::time_point context_at_, start_;
     double last_ms_ = 0;
     FlightLog log_;
+    std::int64_t uploaded_bytes_ = 0;
+    std::vector<std::size_t> pictured_;
+    std::vector<PosePicture> pictures_;
 };
 
-nlohmann::ordered_json loader_report(const LoaderCounters& c) {
-    const double tiles = static_cast<double>(std::max<std::int64_t>(c.tiles, 1));
-    return {{"tiles", c.tiles},
-            {"cpu_us_per_tile", 1e6 * c.cpu_seconds / tiles},
-            {"latency_ms_mean", 1e3 * c.latency_seconds / tiles}};
+FlightFacts facts_of(const Scene& scene, const ViewOptions& o, const FlyOptions& f, const std::string& renderer) {
+    FlightFacts facts;
+    facts.store = std::filesystem::path(o.store).filename().string();
+    facts.command = f.command;
+    facts.renderer = renderer;
+    facts.machine = machine_name();
+    facts.lod = command_line_of(o.lod);
+    facts.guaranteed = o.lod.is_guaranteed();
+    facts.settled = f.settled;
+    facts.see_through = f.see_through;
+    facts.fps = f.fps;
+    facts.tau_px = o.tau_px;
+    facts.texture_tau_px = o.texture_tau_px;
+    facts.fov_deg = o.fov_deg;
+    facts.width_px = o.width_px;
+    facts.height_px = o.height_px;
+    facts.budget_bytes = o.budget_bytes;
+    facts.peak_resident_bytes = scene.peak_resident_bytes();
+    facts.peak_rss_bytes = process_usage().peak_rss_bytes;
+    facts.store_updates = scene.updates();
+    facts.height_quantum_error_m = scene.dataset().height_quantum_error_m;
+    facts.paging = scene.counters();
+    for (const TileKind kind : {TileKind::height, TileKind::texture})
+        facts.loads[static_cast<std::size_t>(kind)] = scene.loader_counters(kind);
+    return facts;
 }
 
-nlohmann::ordered_json report_of(const FlightLog& log, const Scene& scene, const ViewOptions& o, const FlyOptions& f,
-                                 const std::string& renderer) {
-    const PagerCounters c = scene.counters();
-    const std::int64_t peak = process_usage().peak_rss_bytes;
-    nlohmann::ordered_json report = {
-        {"frames", log.frame_ms.values.size()},
-        {"frame_ms", log.frame_ms.spread()},
-        {"select_ms", log.select_ms.spread()},
-        {"triangles", log.triangles.mean_max()},
-        {"tiles_drawn", log.tiles.mean_max()},
-        {"budget_bytes", o.budget_bytes},
-        {"peak_resident_bytes", scene.peak_resident_bytes()},
-        {"peak_rss_bytes", peak},
-        {"fixed_rss_bytes", log.fixed_rss_bytes},
-        {"tile_rss_bytes", peak - log.fixed_rss_bytes},
-        {"tiles_paged_in", c.tiles_paged_in},
-        {"tiles_paged_out", c.tiles_paged_out},
-        {"tiles_prefetched", c.prefetched},
-        {"requests_refused", c.refused},
-        {"bytes_read", c.bytes_read},
-        {"heights_loaded", loader_report(scene.loader_counters(TileKind::height))},
-        {"textures_loaded", loader_report(scene.loader_counters(TileKind::texture))},
-        {"frames_with_stand_ins", log.stand_ins},
-        {"selections_reused", log.reused},
-        {"lod", command_line_of(o.lod)},
-        {"guaranteed", o.lod.is_guaranteed()},
-        {"tiles_reused_share", log.tiles_reused.values.empty() ? 0 : log.tiles_reused.mean()},
-        {"budget_limited_frames", log.limited},
-        {"holes", log.holes},
-        {"max_bound_px", log.bound.max()},
-        {"error_integral_px", log.mean_bound.mean()},
-        {"tau_effective_px", log.tau.mean_max()},
-        {"cold_start_ms", {{"within_8_px", log.coarse_after_ms}, {"within_tau", log.true_after_ms}}},
-        {"damaged_tiles", c.damaged_tiles},
-        {"store_updates", scene.updates()},
-        {"tau_px", o.tau_px},
-        {"size_px", {o.width_px, o.height_px}},
-        {"renderer", renderer}};
-    if (f.settled) {
-        const double settled = log.settled_mean_bound.mean();
-        report["settled"] = {{"error_integral_px", settled},
-                             {"error_integral_ratio", settled > 0 ? log.mean_bound.mean() / settled : 1},
-                             {"triangles", log.settled_triangles.mean_max()},
-                             {"least_triangle_share", log.least_triangle_share()}};
-    }
-    if (f.see_through) {
-        report["see_through_pixels"] = log.see_through;
-        report["frames_looked_through"] = log.looked_through;
-    }
-    return report;
+Result<ReportFolder> report_folder(const FlyOptions& f) {
+    return ReportFolder::prepare(f.report, {"index.html", "flight.csv", "flight.json"}, f.force);
 }
 
-void print(const FlightLog& log, const Scene& scene, const ViewOptions& o, const FlyOptions& f,
-           const std::string& renderer) {
-    const PagerCounters c = scene.counters();
-    fmt::print(
-        "{} frames on {}: median {:.1f} ms, p99 {:.1f} ms; selection median {:.3f} ms; {:.0f} triangles in {:.0f} "
-        "tiles (mean)\n"
-        "promised within {:.3g} px; {} frames with stand-ins, {} holes; {:.1f} of {:.1f} MB for tiles, {} tiles in, {} "
-        "out{}{}\n",
-        log.frame_ms.values.size(), renderer, log.frame_ms.quantile(0.5), log.frame_ms.quantile(0.99),
-        log.select_ms.quantile(0.5), log.triangles.mean(), log.tiles.mean(), log.bound.max(), log.stand_ins, log.holes,
-        static_cast<double>(scene.peak_resident_bytes()) / 1e6, static_cast<double>(o.budget_bytes) / 1e6,
-        c.tiles_paged_in, c.tiles_paged_out, c.damaged_tiles > 0 ? fmt::format(", {} damaged", c.damaged_tiles) : "",
-        scene.updates() > 0 ? fmt::format("; the store was updated {} times", scene.updates()) : "");
-    if (log.limited > 0)
-        fmt::print("the budget bound in {} frames: tau {:.2f} px at most\n", log.limited, log.tau.max());
-    if (f.settled)
-        fmt::print(
-            "error over the flight {:.4f} px (mean promise), settled {:.4f}; at least {:.0f} % of the triangles\n",
-            log.mean_bound.mean(), log.settled_mean_bound.mean(), 100 * log.least_triangle_share());
-    if (f.see_through)
-        fmt::print("{} see-through pixels in {} frames that promise something\n", log.see_through, log.looked_through);
+Result<void> write_report(const FlightLog& log, const FlightFacts& facts, const std::vector<PosePicture>& pictures,
+                          const FlyOptions& f) {
+    auto folder = report_folder(f);
+    if (!folder) return folder.error();
+    auto page = flight_page(log, facts, pictures);
+    if (!page) return page.error();
+    return folder->write({{"index.html", *page},
+                          {"flight.csv", flight_csv(log)},
+                          {"flight.json", flight_json(log, facts).dump(2) + "\n"}});
 }
 
 Result<FlightPath> path_of(const TileStore& store, const ViewOptions& o, const FlyOptions& f) {
@@ -310,8 +280,9 @@ Result<FlightPath> path_of(const TileStore& store, const ViewOptions& o, const F
 }
 
 Result<void> run_blocks(const ViewOptions& o, const FlyOptions& f, const TileStore& store) {
-    for (const auto& [given, option] : {std::pair(f.settled, "--settled"), std::pair(f.see_through, "--see-through"),
-                                        std::pair(f.latency_ms > 0, "--latency")})
+    for (const auto& [given, option] :
+         {std::pair(f.settled, "--settled"), std::pair(f.see_through, "--see-through"),
+          std::pair(f.latency_ms > 0, "--latency"), std::pair(!f.report.empty(), "--report")})
         if (auto ok = refuse_with_blocks(given, option); !ok) return ok;
     auto path = path_of(store, o, f);
     if (!path) return path.error();
@@ -319,6 +290,8 @@ Result<void> run_blocks(const ViewOptions& o, const FlyOptions& f, const TileSto
 }
 
 Result<void> run(const ViewOptions& o, const FlyOptions& f) {
+    if (!f.report.empty())
+        if (auto folder = report_folder(f); !folder) return folder.error();
     auto store = open_store(o);
     if (!store) return store.error();
     if (wants_blocks(o)) return run_blocks(o, f, **store);
@@ -337,17 +310,19 @@ Result<void> run(const ViewOptions& o, const FlyOptions& f) {
     const auto context_at = Clock::now();
     (*display)->frame_settings().wait_until_drawn = true;
     if (auto ok = (*scene)->start(**display); !ok) return ok;
-    auto log = Flight(**scene, **display, o, f, context_at).fly(*path);
+    Flight flight(**scene, **display, o, f, context_at);
+    auto log = flight.fly(*path);
     if (!log) return log.error();
     if (!f.csv.empty())
-        if (auto ok = write_text(f.csv, log->csv); !ok) return ok;
+        if (auto ok = write_text(f.csv, flight_csv(*log)); !ok) return ok;
     if (!f.last_frame.empty())
         if (auto ok = write_png(f.last_frame, o.width_px, o.height_px, (*display)->target().read_pixels()); !ok)
             return ok;
-    const std::string renderer = (*display)->context().renderer();
-    if (o.json != "-") print(*log, **scene, o, f, renderer);
-    return o.json.empty() ? Result<void>{}
-                          : write_text(o.json, report_of(*log, **scene, o, f, renderer).dump(2) + "\n");
+    const FlightFacts facts = facts_of(**scene, o, f, (*display)->context().renderer());
+    if (!f.report.empty())
+        if (auto ok = write_report(*log, facts, flight.pictures(), f); !ok) return ok;
+    if (o.json != "-") fmt::print("{}", flight_text(*log, facts));
+    return o.json.empty() ? Result<void>{} : write_text(o.json, flight_json(*log, facts).dump(2) + "\n");
 }
 
 }  // namespace
@@ -379,7 +354,13 @@ int run_fly(int argc, char** argv) {
         ->check(CLI::Range(0, 60000));
     app.add_option("--csv", f.csv, "Write one line a frame")->type_name("FILE");
     app.add_option("--last-frame", f.last_frame, "Write the last frame as PNG")->type_name("FILE");
+    auto* report =
+        app.add_option("--report", f.report,
+                       "Write a page of charts and pictures, flight.csv and flight.json into this new folder")
+            ->type_name("DIR");
+    app.add_flag("--force", f.force, "Replace an earlier report")->needs(report);
     if (const int code = parse_arguments(app, argc, argv); code >= 0) return code;
+    f.command = typed_command("fly", argc, argv);
     if (auto ok = check_view_options(o); !ok) return report_error("scree-view fly", ok.error());
     install_interrupt_handler();
     if (auto ok = run(o, f); !ok) return report_error("scree-view fly", ok.error());

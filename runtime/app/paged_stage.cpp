@@ -50,7 +50,7 @@ Result<std::unique_ptr<Stage>> PagedStage::create(const ViewOptions& o, std::sha
     auto display = Display::create(*stage->scene_, shown);
     if (!display) return display.error();
     stage->display_ = std::move(*display);
-    set_look(o, stage->settings());
+    set_look(o, stage->display_->frame_settings());
     if (auto ok = stage->scene_->start(*stage->display_); !ok) return ok.error();
     return std::unique_ptr<Stage>(std::move(stage));
 }

@@ -166,6 +166,16 @@ struct Selector::Impl {
             }
     }
 
+    // The addresses under or at which something is asked for: a tile drawn there stands in for it.
+    void note_missing() {
+        over_missing_.clear();
+        for (const TileRequest& request : result.requests)
+            for (int level = 0; level <= request.id.level; ++level)
+                over_missing_.push_back(ancestor_at(request.id, level));
+        std::sort(over_missing_.begin(), over_missing_.end());
+        over_missing_.erase(std::unique(over_missing_.begin(), over_missing_.end()), over_missing_.end());
+    }
+
     void emit(Cut& cut, const SelectionSettings& settings) {
         const int n = dataset.lattice.tile_cells_log2;
         const auto& nodes = cut.nodes();
@@ -188,7 +198,8 @@ struct Selector::Impl {
             item.edge_mask = drawn.edge_mask;
             item.morph = drawn.morph;
             item.edge_morph = drawn.edge_morph;
-            textures.place(cut, static_cast<std::int32_t>(k), settings.growth_s, item);
+            const bool sharp = textures.place(cut, static_cast<std::int32_t>(k), settings.growth_s, item);
+            if (!sharp || std::binary_search(over_missing_.begin(), over_missing_.end(), node.id)) ++result.stand_ins;
             ++result.nodes;
             const double bound_px = cut.drawn_error_m(node, drawn) / cut.certain_metres_per_px(node);
             item.bound_px = static_cast<float>(bound_px);
@@ -253,12 +264,13 @@ struct Selector::Impl {
         r.max_bound_px = r.mean_bound_px = 0;
         r.complete = true;
         r.growing = r.budget_limited = false;
-        r.triangles = r.nodes = r.culled = r.refine_steps = 0;
+        r.triangles = r.nodes = r.stand_ins = r.culled = r.refine_steps = 0;
     }
 
     void select(const SelectionSettings& settings, const Residency& residency) {
         make_plan(settings, residency);
         request_missing(settings, residency);
+        note_missing();
         if (!use_standing_) {
             // What is planned is what is drawn; textures that are still to come are stood in for.
             emit(plan, settings);
@@ -282,6 +294,7 @@ struct Selector::Impl {
     }
 
 private:
+    std::vector<TileId> over_missing_;  // sorted
     bool use_standing_ = false;
     bool pages_fit_ = false;
     std::vector<std::int32_t> tile_of_node_, node_of_tile_;

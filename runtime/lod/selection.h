@@ -81,7 +81,10 @@ struct Selection {
     bool budget_limited = false;  ///< slots bound before tau did
     std::int64_t triangles = 0;   ///< over all views
     std::int64_t nodes = 0;       ///< drawn in any view
-    std::int64_t culled = 0;      ///< tiles left out by Culling::corners though their box is in view, over all views
+    /// Tiles drawn, in any view, in place of finer ones or with coarser textures than planned, because those are
+    /// missing.
+    std::int64_t stand_ins = 0;
+    std::int64_t culled = 0;  ///< tiles left out by Culling::corners though their box is in view, over all views
     std::int64_t refine_steps = 0;
 
     const DrawList& to_render(std::size_t view) const { return parts.empty() ? draws[view] : parts[view]; }

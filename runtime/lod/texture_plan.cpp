@@ -93,7 +93,7 @@ void TexturePlan::used(std::vector<std::int32_t>& slots) const {
     slots.insert(slots.end(), used_.begin(), used_.end());
 }
 
-void TexturePlan::place(const Cut& cut, std::int32_t leaf, double fade_s, DrawItem& item) {
+bool TexturePlan::place(const Cut& cut, std::int32_t leaf, double fade_s, DrawItem& item) {
     const auto& nodes = cut.nodes();
     const CutNode& own = nodes[static_cast<std::size_t>(leaf)];
     const auto rise = [&](std::int32_t& index) {
@@ -112,16 +112,21 @@ void TexturePlan::place(const Cut& cut, std::int32_t leaf, double fade_s, DrawIt
     item.texture.slot = -1;
     std::int32_t index = leaf;
     for (int step = wanted_steps_up(own); step > 0; --step) rise(index);
-    if (!resident(index)) return;
+    // Where textures end above, the last of them is all that can be wanted.
+    while (index >= 0 && !nodes[static_cast<std::size_t>(index)].textured) rise(index);
+    const bool sharp =
+        !residency_->has_textures || index < 0 || nodes[static_cast<std::size_t>(index)].texture_slot != kNotResident;
+    if (!resident(index)) return sharp;
     item.texture = placed(index);
     const CutNode& chosen = nodes[static_cast<std::size_t>(index)];
     add_neighbours(chosen.id, texel_m(chosen.id.level) / own.texel_per_px, item);
     const double age_s =
         residency_->now_s - residency_->textures.arrived_s[static_cast<std::size_t>(item.texture.slot)];
-    if (!(age_s < fade_s) || !rise(index) || !resident(index)) return;
+    if (!(age_s < fade_s) || !rise(index) || !resident(index)) return sharp;
     item.texture_share = static_cast<float>(std::max(age_s / fade_s, 0.0));
     item.coarse_texture = placed(index);
     fading_ = true;
+    return sharp;
 }
 
 // Only what is wanted counts: a settled picture does not depend on what else happens to be in memory.

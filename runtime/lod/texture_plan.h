@@ -30,8 +30,8 @@ public:
     /// Slots of what is wanted and resident, coarse before fine, and requests for the rest.
     void hand_over(const Cut& cut, std::vector<std::int32_t>& planned, std::vector<TileRequest>& requests) const;
     /// Sets the texture of a leaf: the one wanted, or the nearest resident ancestor. `fade_s`: a texture younger than
-    /// that is blended in over its ancestor's.
-    void place(const Cut& cut, std::int32_t leaf, double fade_s, DrawItem& item);
+    /// that is blended in over its ancestor's. False: an ancestor's stands in for a texture that is missing.
+    bool place(const Cut& cut, std::int32_t leaf, double fade_s, DrawItem& item);
     /// Appends the leaf whole, or in parts of the deepest textures that they deserve and have.
     void emit_parts(const Cut& cut, std::int32_t leaf, const DrawItem& item, DrawList& out) const;
     /// Appends the slots that place() has dealt out since wish().

@@ -24,6 +24,11 @@ std::string with_tile(const LoadedTile& tile) {
     return fmt::format("{} tile {}/{}/{}: {}", name_of(tile.job.kind), id.level, id.x, id.y, tile.error);
 }
 
+std::int64_t sink_bytes(const LoadedTile& tile) {
+    return static_cast<std::int64_t>(tile.job.kind == TileKind::height ? tile.vertices.size() * sizeof(SlotVertex)
+                                                                       : tile.blocks.size());
+}
+
 }  // namespace
 
 Pager::Tables::Tables(const PagerOptions& options, const Lattice& lattice, TileCache::Slots slots)
@@ -110,6 +115,7 @@ Result<std::vector<TileId>> Pager::load_roots(TileKind kind, std::span<const Til
 }
 
 void Pager::put(const LoadedTile& tile, double arrived_s) {
+    counters_.upload_bytes += sink_bytes(tile);
     if (tile.job.kind == TileKind::height) {
         sink_.put_height(tile.job.slot, tile.vertices);
         if (options_.measure) sink_.put_costs(tile.job.slot, tile.vertices, tile.costs);
@@ -190,8 +196,7 @@ int Pager::take_arrivals(std::int64_t upload_bytes, bool wait) {
     while (upload_bytes > 0) {
         LoadedTile* tile = loader_->take(wait && taken == 0);
         if (tile == nullptr) break;
-        upload_bytes -= static_cast<std::int64_t>(
-            tile->job.kind == TileKind::height ? tile->vertices.size() * sizeof(SlotVertex) : tile->blocks.size());
+        upload_bytes -= sink_bytes(*tile);
         accept(tile);
         ++taken;
     }

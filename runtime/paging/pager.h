@@ -40,8 +40,9 @@ struct PagerCounters {
     std::int64_t tiles_paged_out = 0;
     std::int64_t bytes_read = 0;
     std::int64_t damaged_tiles = 0;
-    std::int64_t refused = 0;     ///< requests for which no slot could be had, anew in each frame that makes them
-    std::int64_t prefetched = 0;  ///< of tiles_paged_in, those that came before they were asked for in earnest
+    std::int64_t refused = 0;       ///< requests for which no slot could be had, anew in each frame that makes them
+    std::int64_t upload_bytes = 0;  ///< handed to the sink, roots included
+    std::int64_t prefetched = 0;    ///< of tiles_paged_in, those that came before they were asked for in earnest
 };
 
 /// A later state of the store, and what it is read with.
@@ -105,7 +106,11 @@ public:
     /// The state that was coming is the one shown; the other is gone. Needs roots_ready().
     void switch_over();
 
-    bool idle() const { return loader_->under_way() == 0; }
+    bool idle() const { return queue() == 0; }
+    /// Tiles asked for and not there yet: waiting, being read or staged.
+    std::int64_t queue() const { return loader_->under_way(); }
+    /// Slots that a tile holds or is being loaded into, of all states of the store.
+    std::int64_t slots_in_use(TileKind kind) const { return shown_->of(kind).in_use() + coming_->of(kind).in_use(); }
     const PagerCounters& counters() const { return counters_; }
     LoaderCounters loader_counters(TileKind kind) const { return loader_->counters(kind); }
     /// Tiles of the state that is shown.

@@ -46,7 +46,23 @@ figcaption { font-weight: 600; font-size: .95rem; margin-bottom: .2rem; }
 .charts svg { width: 100%; height: auto; display: block; }
 svg text { fill: var(--soft); font: 13px system-ui, -apple-system, "Segoe UI", Roboto, "Noto Sans", sans-serif; }
 svg .grid { stroke: var(--rule); stroke-width: 1; }
+.c0 { color: var(--blue); } .c1 { color: var(--orange); } .c2 { color: var(--green); } .c3 { color: var(--violet); }
+svg.plot .g { stroke: var(--rule); stroke-width: 1; }
+svg.plot .a { stroke: var(--soft); stroke-width: 1; }
+svg.plot .l { stroke: var(--ink); stroke-width: 1.2; stroke-dasharray: 2 3; }
+svg.plot .s { fill: none; stroke-width: 1.7; stroke-linejoin: round; }
+svg.plot .d { stroke-dasharray: 6 4; }
+svg.plot .n { fill: var(--ink); paint-order: stroke; stroke: var(--page); stroke-width: 4px; stroke-linejoin: round; }
+.keys { display: flex; flex-wrap: wrap; gap: 0 1.1rem; margin: 0 0 .3rem; padding: 0; list-style: none;
+  font-size: .86rem; color: var(--soft); }
+.keys span { display: inline-block; width: 1.3rem; margin-right: .4rem; border-top: 3px solid currentColor;
+  vertical-align: .25em; }
+.keys .d { border-top-style: dashed; }
+.keys .b { width: .8rem; border-top-width: .8rem; vertical-align: -.05em; }
+.about { font-size: .86rem; color: var(--soft); margin: 0 0 .3rem; }
+@media (max-width: 40rem) { svg.plot text { font-size: 17px; } svg.plot .s { stroke-width: 2.4; } }
 .pictures { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(19rem, 100%), 1fr)); gap: 1.2rem; }
+.pictures.along { grid-template-columns: repeat(auto-fit, minmax(min(16rem, 100%), 1fr)); }
 .pictures img { width: 100%; height: auto; display: block; border: 1px solid var(--rule); margin-bottom: 3px; }
 .pictures figcaption { font-weight: 400; font-size: .86rem; }
 dl code { white-space: nowrap; }
@@ -108,12 +124,13 @@ std::string short_number(double v) {
 }
 
 std::string tick_number(double v) {
+    if (v == 0) return "0";  // no -0
     if (std::abs(v) >= 1e6) return fmt::format("{:g}M", v / 1e6);
     if (std::abs(v) >= 1e3) return fmt::format("{:g}k", v / 1e3);
     return fmt::format("{:g}", v);
 }
 
-std::string megabytes(std::int64_t bytes) { return fmt::format("{:.1f}", static_cast<double>(bytes) / 1e6); }
+std::string page_megabytes(std::int64_t bytes) { return fmt::format("{:.1f}", static_cast<double>(bytes) / 1e6); }
 
 std::string shell_quoted(const std::string& word) {
     const bool plain = !word.empty() && word.find_first_not_of(

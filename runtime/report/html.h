@@ -21,7 +21,7 @@ std::string short_number(double value);
 /// Shortest on axes: 5k, 1.5M.
 std::string tick_number(double value);
 /// 10^6 bytes, one digit after the point.
-std::string megabytes(std::int64_t bytes);
+std::string page_megabytes(std::int64_t bytes);
 
 /// A word of a command line as a shell takes it.
 std::string shell_quoted(const std::string& word);

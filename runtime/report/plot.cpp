@@ -13,8 +13,14 @@
 namespace scree {
 namespace {
 
-constexpr double kWidth_px = 760, kHeight_px = 440;
-constexpr double kLeft_px = 74, kTop_px = 62, kBottom_px = 60, kRight_px = 18;
+/// A sheet's size, and what lies round its frame.
+struct Form {
+    bool in_page;  ///< no paper, style, title and legend of its own
+    double width_px, height_px, left_px, top_px, bottom_px, right_px;
+    double label_px;  ///< of the axis below, from the frame down
+};
+constexpr Form kFile{false, 760, 440, 74, 62, 60, 18, 42};
+constexpr Form kFigure{true, 560, 290, 74, 12, 54, 14, 46};
 constexpr double kLine_px = 16;
 constexpr double kLegendKey_px = 26;  // line and marker before a name
 constexpr double kLetter_px = 6.4;    // mean width at 12 px of the usual sans serif faces
@@ -144,32 +150,28 @@ struct LegendEntry {
     bool line = false, dashed = false, marked = false, bar = false;
 };
 
+/// Of a figure in a page: under its title.
+std::string legend_html(const std::vector<LegendEntry>& legend) {
+    std::string html = "<ul class=\"keys\">";
+    for (const LegendEntry& entry : legend)
+        html += fmt::format("<li><span class=\"c{}{}{}\"></span>{}</li>", entry.colour % kColours,
+                            entry.bar ? " b" : "", entry.dashed ? " d" : "", escaped(entry.name));
+    return html + "</ul>";
+}
+
 /// The sheet: paper, frame, axes, legend; and what is drawn on it.
 class Sheet {
 public:
-    Sheet(const std::string& title, const std::string& subtitle, const std::vector<LegendEntry>& legend) {
-        double legend_px = 0;
-        for (const LegendEntry& entry : legend)
-            legend_px = std::max(legend_px, kLegendKey_px + text_px(entry.name) + 14);
-        right_px_ = kWidth_px - kRight_px - legend_px;
-        out_ = fmt::format(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" "
-            "height=\"{1:.0f}\" role=\"img\">\n<title>{2}</title>\n<desc>{3}</desc>\n<style>{4}</style>\n"
-            "<rect class=\"p\" width=\"{0:.0f}\" height=\"{1:.0f}\"/>\n",
-            kWidth_px, kHeight_px, escaped(title), escaped(subtitle), kStyle);
-        text(kLeft_px, 26, title, "t h", "start");
-        for (const std::string& line : wrapped(subtitle, kWidth_px - kLeft_px - kRight_px)) {
-            text(kLeft_px, top_px_ - 17, line, "t u", "start");
-            top_px_ += kLine_px;
-        }
-        if (!subtitle.empty()) top_px_ -= kLine_px;
-        draw_legend(legend);
+    Sheet(const Form& form, const std::string& title, const std::string& subtitle,
+          const std::vector<LegendEntry>& legend)
+        : form_(form), right_px_(form.width_px - form.right_px), top_px_(form.top_px) {
+        form.in_page ? begin_figure(title, subtitle, legend) : begin_file(title, subtitle, legend);
     }
 
-    double left() const { return kLeft_px; }
+    double left() const { return form_.left_px; }
     double right() const { return right_px_; }
     double top() const { return top_px_; }
-    double bottom() const { return kHeight_px - kBottom_px; }
+    double bottom() const { return form_.height_px - form_.bottom_px; }
     double x(double share) const { return left() + share * (right() - left()); }
     double y(double share) const { return bottom() - share * (bottom() - top()); }
 
@@ -189,18 +191,18 @@ public:
         for (const double tick : scale.ticks()) {
             const double at = y(scale.share(tick));
             line(left(), at, right(), at, "g");
-            text(left() - 7, at + 4, number(tick), "t", "end");
+            text(left() - 7, at + 4, tick_text(tick), "t", "end");
         }
-        text(20, (top() + bottom()) / 2, label, "t", "middle", -90);
+        text(form_.in_page ? 14 : 20, (top() + bottom()) / 2, label, "t", "middle", -90);
         line(left(), top(), left(), bottom(), "a");
     }
     void x_axis(const Scale& scale, const std::string& label) {
         for (const double tick : scale.ticks()) {
             const double at = x(scale.share(tick));
             line(at, bottom(), at, bottom() + 4, "a");
-            text(at, bottom() + 18, number(tick), "t", "middle");
+            text(at, bottom() + 18, tick_text(tick), "t", "middle");
         }
-        text((left() + right()) / 2, bottom() + 42, label, "t", "middle");
+        text((left() + right()) / 2, bottom() + form_.label_px, label, "t", "middle");
         line(left(), bottom(), right(), bottom(), "a");
     }
     void levels(const Scale& scale, const std::vector<PlotLevel>& levels) {
@@ -234,9 +236,36 @@ public:
             out_ += fmt::format("{}{:.1f},{:.1f}", k == 0 ? "" : " ", points[k].first, points[k].second);
         out_ += "\"/>\n";
     }
-    std::string finish() && { return std::move(out_) + "</svg>\n"; }
+    std::string finish() && { return std::move(out_) + (form_.in_page ? "</svg></figure>\n" : "</svg>\n"); }
 
 private:
+    std::string tick_text(double tick) const { return form_.in_page ? tick_number(tick) : number(tick); }
+    void begin_file(const std::string& title, const std::string& subtitle, const std::vector<LegendEntry>& legend) {
+        double legend_px = 0;
+        for (const LegendEntry& entry : legend)
+            legend_px = std::max(legend_px, kLegendKey_px + text_px(entry.name) + 14);
+        right_px_ -= legend_px;
+        out_ = fmt::format(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" "
+            "height=\"{1:.0f}\" role=\"img\">\n<title>{2}</title>\n<desc>{3}</desc>\n<style>{4}</style>\n"
+            "<rect class=\"p\" width=\"{0:.0f}\" height=\"{1:.0f}\"/>\n",
+            form_.width_px, form_.height_px, escaped(title), escaped(subtitle), kStyle);
+        text(left(), 26, title, "t h", "start");
+        for (const std::string& line : wrapped(subtitle, form_.width_px - left() - form_.right_px)) {
+            text(left(), top_px_ - 17, line, "t u", "start");
+            top_px_ += kLine_px;
+        }
+        if (!subtitle.empty()) top_px_ -= kLine_px;
+        draw_legend(legend);
+    }
+
+    void begin_figure(const std::string& title, const std::string& subtitle, const std::vector<LegendEntry>& legend) {
+        out_ = fmt::format("<figure><figcaption>{}</figcaption>", escaped(title));
+        if (!subtitle.empty()) out_ += fmt::format("<p class=\"about\">{}</p>", escaped(subtitle));
+        if (legend.size() > 1) out_ += legend_html(legend);
+        out_ += fmt::format("\n<svg class=\"plot\" viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"{}\">\n",
+                            form_.width_px, form_.height_px, escaped(title));
+    }
     void draw_legend(const std::vector<LegendEntry>& legend) {
         double at_y = top_px_ + 8;
         const double at_x = right_px_ + 14;
@@ -251,7 +280,8 @@ private:
     }
 
     std::string out_;
-    double right_px_ = 0, top_px_ = kTop_px;
+    const Form& form_;
+    double right_px_, top_px_;
 };
 
 void draw(Sheet& sheet, const PlotSeries& series, std::size_t colour, const Scale& x, const Scale& y) {
@@ -271,9 +301,7 @@ void draw(Sheet& sheet, const PlotSeries& series, std::size_t colour, const Scal
     end_run();
 }
 
-}  // namespace
-
-std::string to_svg(const LineChart& chart) {
+std::string drawn(const LineChart& chart, const Form& form) {
     Span across(chart.x, false), up(chart.y, true);
     std::vector<LegendEntry> legend;
     for (std::size_t k = 0; k < chart.series.size(); ++k) {
@@ -284,7 +312,7 @@ std::string to_svg(const LineChart& chart) {
     }
     for (const PlotLevel& level : chart.levels) up.add(level.y);
     const Scale x(chart.x, across.ends()), y(chart.y, up.ends());
-    Sheet sheet(chart.title, chart.subtitle, legend);
+    Sheet sheet(form, chart.title, chart.subtitle, legend);
     sheet.y_axis(y, chart.y.label);
     sheet.x_axis(x, chart.x.label);
     sheet.levels(y, chart.levels);
@@ -292,7 +320,7 @@ std::string to_svg(const LineChart& chart) {
     return std::move(sheet).finish();
 }
 
-std::string to_svg(const BarChart& chart) {
+std::string drawn(const BarChart& chart, const Form& form) {
     Span up(chart.y, true);
     std::vector<LegendEntry> legend;
     for (std::size_t k = 0; k < chart.series.size(); ++k) {
@@ -301,10 +329,12 @@ std::string to_svg(const BarChart& chart) {
     }
     for (const PlotLevel& level : chart.levels) up.add(level.y);
     const Scale y(chart.y, up.ends());
-    Sheet sheet(chart.title, chart.subtitle, legend);
+    Sheet sheet(form, chart.title, chart.subtitle, legend);
     sheet.y_axis(y, chart.y.label);
     const double group_px =
         (sheet.right() - sheet.left()) / static_cast<double>(std::max<std::size_t>(1, chart.groups.size()));
+    double widest_px = 0;
+    for (const std::string& group : chart.groups) widest_px = std::max(widest_px, 1.5 * text_px(group));
     const double bar_px = 0.8 * group_px / static_cast<double>(std::max<std::size_t>(1, chart.series.size()));
     const double base = chart.y.logarithmic || !y.can_show(0) ? sheet.bottom() : sheet.y(y.share(0));
     for (std::size_t g = 0; g < chart.groups.size(); ++g) {
@@ -316,14 +346,38 @@ std::string to_svg(const BarChart& chart) {
             sheet.bar(k, middle - 0.4 * group_px + static_cast<double>(k) * bar_px, std::min(at, base), 0.92 * bar_px,
                       std::abs(base - at));
         }
-        const bool crowded = text_px(chart.groups[g]) > group_px;
+        // A page's text is larger where the screen is narrow; there all names turn alike.
+        const bool crowded = form.in_page ? widest_px > group_px : text_px(chart.groups[g]) > group_px;
         sheet.text(middle, sheet.bottom() + (crowded ? 14 : 18), chart.groups[g], "t", crowded ? "end" : "middle",
                    crowded ? -25 : 0);
     }
     sheet.levels(y, chart.levels);
-    sheet.text((sheet.left() + sheet.right()) / 2, sheet.bottom() + 50, chart.groups_label, "t", "middle");
+    sheet.text((sheet.left() + sheet.right()) / 2, sheet.bottom() + (form.in_page ? form.label_px : 50),
+               chart.groups_label, "t", "middle");
     sheet.line(sheet.left(), sheet.bottom(), sheet.right(), sheet.bottom(), "a");
     return std::move(sheet).finish();
+}
+
+}  // namespace
+
+std::string to_svg(const LineChart& chart) { return drawn(chart, kFile); }
+std::string to_svg(const BarChart& chart) { return drawn(chart, kFile); }
+std::string to_figure(const LineChart& chart) { return drawn(chart, kFigure); }
+std::string to_figure(const BarChart& chart) { return drawn(chart, kFigure); }
+
+std::vector<std::pair<double, double>> thinned(const std::vector<std::pair<double, double>>& points, std::size_t most) {
+    if (points.size() <= most || most < 2) return points;
+    const std::size_t run = (2 * points.size() + most - 1) / most;
+    std::vector<std::pair<double, double>> kept;
+    for (std::size_t from = 0; from < points.size(); from += run) {
+        const auto first = points.begin() + static_cast<std::ptrdiff_t>(from);
+        const auto last = points.begin() + static_cast<std::ptrdiff_t>(std::min(from + run, points.size()));
+        const auto [low, high] =
+            std::minmax_element(first, last, [](const auto& a, const auto& b) { return a.second < b.second; });
+        kept.push_back(*std::min(low, high));
+        if (low != high) kept.push_back(*std::max(low, high));
+    }
+    return kept;
 }
 
 }  // namespace scree

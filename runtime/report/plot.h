@@ -1,8 +1,9 @@
-// Charts of an experiment as SVG: lines and bars, linear or logarithmic axes. One file a chart, no script and no font
-// of its own; colours follow the reader's light or dark scheme, and series differ by marker as well as by colour. The
-// same chart gives the same bytes. Pure functions; any thread.
+// Charts as SVG: lines and bars, linear or logarithmic axes. A file of its own, or a figure in an HtmlPage; no script
+// and no font of its own; colours follow the reader's light or dark scheme, and marked series differ by marker as well
+// as by colour. The same chart gives the same bytes. Pure functions; any thread.
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <utility>
@@ -58,7 +59,16 @@ struct BarChart {
     std::vector<PlotLevel> levels;
 };
 
+/// A file.
 std::string to_svg(const LineChart& chart);
 std::string to_svg(const BarChart& chart);
+
+/// `<figure>` of an HtmlPage, for `<div class="charts">`: title, subtitle and legend are the page's text.
+std::string to_figure(const LineChart& chart);
+std::string to_figure(const BarChart& chart);
+
+/// At most about so many of a long series: of each run of points the least and the greatest, where they stand, so that
+/// no peak is lost.
+std::vector<std::pair<double, double>> thinned(const std::vector<std::pair<double, double>>& points, std::size_t most);
 
 }  // namespace scree

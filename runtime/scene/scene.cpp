@@ -94,12 +94,24 @@ void Scene::make_selectors() {
     ahead_ = std::make_unique<Selector>(dataset());
 }
 
-Result<MemoryPlan> Scene::plan_of(const Dataset& dataset, const SceneOptions& options) {
+MoreMemory Scene::more_memory(const Dataset& dataset, const SceneOptions& options) {
     MoreMemory more;
     if (options.lod.method != LodMethod::geomip)
         more = {PageMesher::slot_cost(dataset), PageMesher::fixed_cost(dataset)};
     if (options.lod.metric == ErrorMetric::deboer) more.per_height_slot = Pager::corrections_cost();
-    return plan_memory(dataset, options.budget_bytes, 2, more);
+    return more;
+}
+
+Result<MemoryPlan> Scene::plan_of(const Dataset& dataset, const SceneOptions& options) {
+    return plan_memory(dataset, options.budget_bytes, 2, more_memory(dataset, options));
+}
+
+std::int64_t Scene::tile_bytes(TileKind kind) const {
+    if (!pager_) return 0;
+    const std::int64_t each = kind == TileKind::height
+                                  ? height_slot_cost(dataset()) + more_memory(dataset(), options_).per_height_slot
+                                  : texture_slot_cost(dataset());
+    return pager_->slots_in_use(kind) * each;
 }
 
 void Scene::make_mesher() {
@@ -274,6 +286,7 @@ PagerCounters Scene::counters() const {
     c.bytes_read += now.bytes_read;
     c.damaged_tiles += now.damaged_tiles;
     c.refused += now.refused;
+    c.upload_bytes += now.upload_bytes;
     c.prefetched += now.prefetched;
     return c;
 }

@@ -80,6 +80,9 @@ public:
     PagerCounters counters() const;
     LoaderCounters loader_counters(TileKind kind) const;
     const Pager& pager() const { return *pager_; }
+    /// Of the slots that tiles of a kind hold or are being loaded into, with their bookkeeping: a part of
+    /// memory().resident_bytes.
+    std::int64_t tile_bytes(TileKind kind) const;
     SceneOptions& options() { return options_; }
     const SceneOptions& options() const { return options_; }
 
@@ -111,6 +114,7 @@ private:
     void make_selectors();
     void make_mesher();
     void mesh(std::span<const Camera> views, double half_curvature, const Residency& residency, Selection& selection);
+    static MoreMemory more_memory(const Dataset& dataset, const SceneOptions& options);
     static Result<MemoryPlan> plan_of(const Dataset& dataset, const SceneOptions& options);
     void forget_selections();
     void tell(const std::string& message) const;

@@ -1,10 +1,13 @@
 #include "common/store/height_codec.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <zstd.h>
 
 #include <cmath>
 #include <limits>
+#include <set>
+#include <string>
 
 #include "common/mesh/geometric_error.h"
 #include "common/store/byte_io.h"
@@ -14,7 +17,23 @@
 namespace scree {
 namespace {
 
-constexpr HeightCodec kCodecs[] = {HeightCodec::raw, HeightCodec::plane};
+std::vector<HeightCodec> all_codecs() {
+    std::vector<HeightCodec> all;
+    for (const NamedHeightCodec& named : height_codecs()) all.push_back(named.codec);
+    return all;
+}
+const std::vector<HeightCodec> kCodecs = all_codecs();
+
+TEST(HeightCodec, EveryOneHasANumberAndANameOfItsOwn) {
+    std::set<std::string> names;
+    for (std::size_t k = 0; k < kCodecs.size(); ++k) {
+        EXPECT_EQ(static_cast<std::size_t>(kCodecs[k]), k);
+        EXPECT_TRUE(names.insert(height_codecs()[k].name).second) << height_codecs()[k].name;
+    }
+    // Stores have them by these.
+    EXPECT_STREQ(height_codecs()[0].name, "raw");
+    EXPECT_STREQ(height_codecs()[1].name, "plane");
+}
 
 HeightBounds random_bounds(test::Random& random, int n) {
     HeightBounds bounds;
@@ -100,7 +119,7 @@ TEST(HeightCodec, ATileDecodedIntoAnUsedOneKeepsNothingOfIt) {
     for (int k = 0; k < 300; ++k) {
         const int n = test::uniform(random, kMinTileCellsLog2, 5);
         const HeightTile tile = random_tile(random, n, 1000);
-        const HeightCodec codec = kCodecs[k % 2];
+        const HeightCodec codec = kCodecs[static_cast<std::size_t>(k) % kCodecs.size()];
         auto bytes = encode_height_tile(tile, n, codec);
         ASSERT_TRUE(decode_height_tile(bytes, n, static_cast<int>(codec), reused).ok());
         ASSERT_EQ(reused, tile);
@@ -193,9 +212,18 @@ TEST(HeightCodec, ATileOfAnotherSizeIsRefused) {
 }
 
 TEST(HeightCodec, UnknownCodecsAreRefused) {
-    const auto bytes = encode_height_tile(small_tile(), 2, HeightCodec::raw);
-    for (const int codec : {-1, 2, 3, 255, std::numeric_limits<int>::max(), std::numeric_limits<int>::min()})
-        EXPECT_FALSE(decode_height_tile(bytes, 2, codec).ok()) << codec;
+    const int next = static_cast<int>(kCodecs.size());
+    for (const HeightCodec known : kCodecs) {
+        const auto bytes = encode_height_tile(small_tile(), 2, known);
+        for (const int codec :
+             {-1, next, next + 1, 255, std::numeric_limits<int>::max(), std::numeric_limits<int>::min()}) {
+            const auto result = decode_height_tile(bytes, 2, codec);
+            ASSERT_FALSE(result.ok()) << codec;
+            // That it is unknown, not that what it would have made of the bytes is damaged.
+            EXPECT_NE(result.error().message.find(fmt::format("unknown codec {}", codec)), std::string::npos)
+                << result.error().message;
+        }
+    }
 }
 
 TEST(HeightCodec, HeaderFieldsOutOfRangeAreRefused) {
@@ -253,7 +281,7 @@ TEST(HeightCodec, RandomBitFlipsNeverCrashAndNeverYieldHeightsOutOfRange) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());
     for (int k = 0; k < 20000; ++k) {
-        const HeightCodec codec = kCodecs[k % 2];
+        const HeightCodec codec = kCodecs[static_cast<std::size_t>(k) % kCodecs.size()];
         auto bytes = encode_height_tile(small_tile(), 2, codec);
         for (int flips = test::uniform(random, 1, 4); flips > 0; --flips) {
             const int bit = test::uniform(random, 0, static_cast<int>(bytes.size()) * 8 - 1);

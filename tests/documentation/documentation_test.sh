@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
-# Manual pages and completion say what --help says.
-#     documentation_test.sh BUILD PART        PART: man_pages or completion
+# Manual pages and completion say what --help says; docs name every format that is read.
+#     documentation_test.sh BUILD PART        PART: man_pages, completion or formats
 set -euo pipefail
 
 build=$1 part=$2
+docs=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/../../docs" && pwd -P)
 pages=$build/documentation
 
 fail() {
@@ -98,6 +99,21 @@ completion() {
     expect "auto" scree-view shot --curvature au
     expect "--tau --tau-max" scree-view fly --tau
     expect "--fov --fps" scree-view alps.scree --f
+}
+
+# The refusal of a file of no known kind names all that are: (TIFF, ...) nor ... (DTED, ...).
+formats() {
+    folder=$(mktemp -d) # not local: the trap wants it
+    trap 'rm -rf -- "$folder"' EXIT
+    printf 'no raster' >"$folder/a.xyz"
+    local refusal name table count=0
+    refusal=$("$build/tools/scree" build "$folder/a.xyz" -o "$folder/a.scree" 2>&1) && fail "text was built"
+    table=$(grep -E '^\| (heights|imagery) \|' "$docs/building-pyramids.md" | tr -d '`')
+    while read -r name; do
+        grep -qwF -- "$name" <<<"$table" || fail "building-pyramids.md does not name $name among what is read"
+        count=$((count + 1))
+    done < <(grep -oE '\([^)]*\)' <<<"$refusal" | tr -d '()' | sed 's/, /\n/g')
+    ((count > 10)) || fail "only $count formats were found in: $refusal"
 }
 
 "$part"

@@ -10,12 +10,14 @@
 #include "tests/fuzz/file_input.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tools/source/grid_file.h"
+#include "tools/source/raster_formats.h"
 
 namespace scree::fuzz {
 namespace {
 
-constexpr std::array<const char*, 9> kNames = {"a.asc", "a.dt1", "b.bil", "b.bip", "b.bsq",
-                                               "b.flt", "b.dem", "c.dem", "c.dat"};
+// A header that stands beside samples is fuzzed instead of them where the name begins with b, and for c.dat.
+constexpr std::array kNames = {"a.asc", "a.dt1", "b.bil", "b.bip", "b.bsq",
+                               "b.flt", "b.dem", "c.dem", "c.dat", "N37W123.hgt"};
 
 std::string dted() {
     std::string file =
@@ -72,6 +74,32 @@ std::string usgs_dem(const char* system, const char* step_z, const char* record_
 
 std::string of_kind(std::size_t name, const std::string& content) { return static_cast<char>(name) + content; }
 
+// The file that an input stands for, with its header where it has one.
+std::string lay_out(std::string_view input) {
+    const std::string name = kNames[static_cast<unsigned char>(input[0]) % kNames.size()];
+    const std::string_view content = input.substr(1);
+    const std::string path = folder().path(name);
+    const bool headered = name[0] == 'b' || name == "c.dat";
+    static const std::string kSamples(997, '\x11');
+    folder().write(name, headered ? std::string_view(kSamples) : content);
+    const std::filesystem::path header = std::filesystem::path(path).replace_extension(".hdr");
+    if (headered)
+        folder().write(header.filename().string(), content);
+    else
+        std::filesystem::remove(header);
+    return path;
+}
+
+// A format without a seed is not fuzzed: mutations do not find a signature.
+void require_a_seed_of_every_format(const std::vector<std::string>& seeds) {
+    for (const GridFormat& format : grid_formats()) {
+        const bool has_one = std::any_of(seeds.begin(), seeds.end(), [&](const std::string& seed) {
+            return grid_format_of(lay_out(seed)) == &format;
+        });
+        require(has_one, fmt::format("{} has no seed", format.name).c_str());
+    }
+}
+
 void decode_all(const std::string& path, GridFile& grid) {
     const DecodedLayout& layout = grid.decoder->layout();
     require(layout.width > 0 && layout.height > 0 && layout.channels > 0, "an opened grid has samples");
@@ -88,13 +116,10 @@ void decode_all(const std::string& path, GridFile& grid) {
 }  // namespace
 
 std::vector<std::string> seeds() {
-    return {
+    const std::vector<std::string> all = {
         of_kind(0, "ncols 3\nnrows 2\nxllcorner 1000\nyllcorner 5000\ncellsize 10\nNODATA_value -9999\n1 2 3\n4 5 6\n"),
-        of_kind(0, "NROWS 2 NCOLS 2 YLLCENTER 1 XLLCENTER 2 DX 1 DY 2\n1.5 -2e3 nan +7"),
-        of_kind(1, dted()),
-        of_kind(2, raw_header("BIL")),
-        of_kind(3, raw_header("BIP")),
-        of_kind(4, raw_header("BSQ")),
+        of_kind(0, "NROWS 2 NCOLS 2 YLLCENTER 1 XLLCENTER 2 DX 1 DY 2\n1.5 -2e3 nan +7"), of_kind(1, dted()),
+        of_kind(2, raw_header("BIL")), of_kind(3, raw_header("BIP")), of_kind(4, raw_header("BSQ")),
         of_kind(5, "ncols 4\nnrows 5\nxllcorner 1\nyllcorner 2\ncellsize 3\nNODATA_value -9999\nbyteorder MSBFIRST\n"),
         of_kind(7, usgs_dem("     1    10", "0.100000E+01", "")),
         of_kind(7, usgs_dem("     1    10", "0.100000E+00", "\r\n")),
@@ -106,7 +131,11 @@ std::vector<std::string> seeds() {
         of_kind(8,
                 "ENVI\ndescription = {\n x}\nsamples = 4\nlines = 3\nbands = 2\nheader offset = 1\ndata type = 2\n"
                 "interleave = bil\nbyte order = 1\nmap info = {UTM, 1, 1, 5, 6, 7, 8, 33, North, WGS-84}\n"
-                "coordinate system string = {GEOGCS[\"x\"]}\ndata ignore value = -1\n")};
+                "coordinate system string = {GEOGCS[\"x\"]}\ndata ignore value = -1\n"),
+        // Of another size than a tile's: georeference_fuzz has whole ones.
+        of_kind(9, "x")};
+    require_a_seed_of_every_format(all);
+    return all;
 }
 
 }  // namespace scree::fuzz
@@ -115,17 +144,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     using namespace scree;
     using namespace scree::fuzz;
     if (size == 0) return 0;
-    const std::string name = kNames[data[0] % kNames.size()];
-    const std::string_view content = text_of(data + 1, size - 1);
-    const std::string path = folder().path(name);
-    const bool headered = name[0] == 'b' || name == "c.dat";
-    static const std::string kSamples(997, '\x11');
-    folder().write(name, headered ? std::string_view(kSamples) : content);
-    const std::string header = path.substr(0, path.size() - 3) + "hdr";
-    if (headered)
-        folder().write(std::filesystem::path(header).filename().string(), content);
-    else
-        std::filesystem::remove(header);
+    const std::string path = lay_out(text_of(data, size));
     Result<std::optional<GridFile>> grid = open_grid_file(path);
     if (!grid) {
         require(grid.error().code == ErrorCode::input, "what cannot be read is an input error");

@@ -49,9 +49,11 @@ Dataset dataset() {
 }  // namespace
 
 std::vector<std::string> seeds() {
-    return {height_seed(HeightCodec::raw, false),  height_seed(HeightCodec::plane, false),
-            height_seed(HeightCodec::plane, true), texture_seed(TextureCodec::raw),
-            texture_seed(TextureCodec::split),     std::string("\2\0", 2) + dataset_to_json(dataset())};
+    std::vector<std::string> all{texture_seed(TextureCodec::raw), texture_seed(TextureCodec::split),
+                                 std::string("\2\0", 2) + dataset_to_json(dataset())};
+    for (const NamedHeightCodec& named : height_codecs())
+        for (const bool with_presence : {false, true}) all.push_back(height_seed(named.codec, with_presence));
+    return all;
 }
 
 }  // namespace scree::fuzz
@@ -61,19 +63,21 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     using namespace scree::fuzz;
     if (size < 2) return 0;
     const std::span<const std::uint8_t> payload(data + 2, size - 2);
-    const int codec = data[1] % 3;
     if (data[0] % 3 == 0) {
+        const int codec = data[1] % (static_cast<int>(height_codecs().size()) + 1);  // one that is unknown, too
         const auto tile = decode_height_tile(payload, kCellsLog2, codec);
         if (!tile) {
             require(tile.error().code == ErrorCode::store, "a damaged payload is a store error");
         } else {
             for (const std::int32_t n : tile->samples) require(std::abs(n) <= kMaxHeightUnits, "heights are in range");
-            const auto again = encode_height_tile(*tile, kCellsLog2, HeightCodec::plane);
-            const auto same = decode_height_tile(again, kCellsLog2, static_cast<int>(HeightCodec::plane));
-            require(same.ok() && *same == *tile, "what was decoded survives a round trip");
+            for (const NamedHeightCodec& named : height_codecs()) {
+                const auto again = encode_height_tile(*tile, kCellsLog2, named.codec);
+                const auto same = decode_height_tile(again, kCellsLog2, static_cast<int>(named.codec));
+                require(same.ok() && *same == *tile, "what was decoded survives a round trip");
+            }
         }
     } else if (data[0] % 3 == 1) {
-        const auto tile = decode_texture_tile(payload, kTextureLog2, codec);
+        const auto tile = decode_texture_tile(payload, kTextureLog2, data[1] % 3);
         require(tile.ok() || tile.error().code == ErrorCode::store, "a damaged payload is a store error");
         if (tile) require(tile->blocks.size() == bc1_chain_bytes(kTextureLog2), "a texture has all its mips");
     } else {

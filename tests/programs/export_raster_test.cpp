@@ -400,14 +400,28 @@ TEST_F(ExportImagery, ABoxHoldsTheTexelsThatItMeets) {
 }
 
 TEST_F(ExportImagery, ACoarserTexelStandsForSeveralWhereTexturesEnd) {
-    write_heights_i16(dem_, hills(80, 70, 5), {400000, 5300000, 40, 32633});
+    HeightGrid land = hills(80, 70, 5);
+    for (int row = 29; row < 35; ++row) std::fill_n(&land.at(46, row), 3, -9999.0f);
+    write_heights_i16(dem_, land, {400000, 5300000, 40, 32633}, "-9999");
     write_heights_i16(folder_.file("inset.tif"), hills(120, 100, 6), {401200, 5299200, 5, 32633});
-    build_store_from({dem_, folder_.file("inset.tif"), "--texture-size", "16", "--tile-size", "9", "--force"}, store_);
+    const auto image = [&](const std::string& name, int width, int height, const Place& place) {
+        write_image(folder_.file(name), width, height, 3, 8, &place, patchwork);
+        return folder_.file(name);
+    };
+    const std::string under = image("under.tif", 80, 70, {400000, 5300000, 40, 32633, true}),
+                      fine = image("fine.tif", 120, 100, {401190, 5299210, 5, 32633, true});
+    build_store_from({dem_, folder_.file("inset.tif"), "--imagery", under, fine, "--texture-size", "16", "--tile-size",
+                      "9", "--fill", "none", "--force"},
+                     store_);
     open_store();
     const int level = opened_->dataset().texture_deepest_level;
-    if (!ends_above(level)) GTEST_SKIP() << "this build refines every texture to the deepest level";
+    ASSERT_TRUE(ends_above(level));
     export_to(out_, {}, "--imagery");
     expect_texels(read_raster(out_), level, 0, 0);
+    // A box over the corner where the fine image ends.
+    const double w = opened_->dataset().texel_m(level);
+    export_to(out_, {"--force", "--box", "401700,5298400,402000,5298900"}, "--imagery");
+    expect_texels(read_raster(out_), level, static_cast<std::int64_t>(1700 / w), static_cast<std::int64_t>(1100 / w));
 }
 
 nlohmann::json gdalinfo(const std::string& file) {

@@ -332,26 +332,16 @@ TEST(Placement, OfCellsThatAreNotSquare) {
 
 TEST(Placement, OfEveryFormat) {
     const std::vector<std::string> utm{"--assume-crs", "EPSG:32633"}, degrees{"--assume-crs", "EPSG:4326"};
-    SampleGrid oblong = kUtm;
-    oblong.row_y = -41;
-    for (const HeightFormat format : {HeightFormat::ascii_corner, HeightFormat::ascii_center,
-                                      HeightFormat::float_corner, HeightFormat::float_center, HeightFormat::bil}) {
-        SCOPED_TRACE(static_cast<int>(format));
-        expect_in_place(one(of_areas(kUtm), format, utm));
-        if (format == HeightFormat::ascii_corner || format == HeightFormat::ascii_center)
-            expect_in_place(one(of_areas(oblong), format, utm));
+    for (const PlacedExample& example : placed_grid_examples()) {
+        SCOPED_TRACE(static_cast<int>(example.format));
+        Sources sources = one(example.grid, example.format, example.arguments);
+        sources.steps = example.steps;
+        expect_in_place(sources);
     }
     expect_in_place(one(of_areas(kDegrees), HeightFormat::ascii_corner, degrees));
     expect_in_place(one(of_areas(kUtm), HeightFormat::png, utm));
     expect_in_place(one(of_areas(kUtm), HeightFormat::world_file_tiff, utm));
     expect_in_place(one(of_areas(kUtm).turned(30), HeightFormat::world_file_tiff, utm));
-    expect_in_place(one(north_up("EPSG:4326", 14, 48, 1.0 / 120, 121, 121), HeightFormat::dted));
-}
-
-TEST(Placement, OfHgt) {
-    Sources sources = one(north_up("EPSG:4326", -71, -30, 1.0 / 600, 601, 1201, 1.0 / 1200), HeightFormat::hgt);
-    sources.steps = 27;
-    expect_in_place(sources);
 }
 
 TEST(Placement, OfEveryCrs) {

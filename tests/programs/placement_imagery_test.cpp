@@ -59,21 +59,21 @@ struct ImageCheck {
     double worst = 0;             ///< levels
     double sum = 0, squares = 0;  ///< of residual times slope, and of the slope
     double red = 0, blue = 0;     ///< sums of residuals
-    std::int64_t texels = 0, bare = 0;
+    std::int64_t texels = 0, deepest = 0, bare = 0;
 };
 
-// Over the texels of the deepest level whose neighbourhood is within the image and away from the wave's turns.
+// Over the texels where textures end whose neighbourhood is within the image and away from the wave's turns.
 ImageCheck compare_texels(const StoreUnderTest& store, const Wave& wave) {
     const Dataset& d = store.dataset();
-    const int level = d.texture_deepest_level, size = d.texture_size();
-    const double texel_m = d.texel_m(level);
+    const int size = d.texture_size();
     const Move move(d.crs, wave.grid.crs);
     ImageCheck check;
     const auto look = [&](const SqliteStore::RowView& row) {
         const auto id = tile_from_key(store.lattice(), row.key);
-        if (!id || id->level != level) return true;
         const auto tile = decode_texture_tile(row.payload, d.texture_size_log2, row.codec);
-        EXPECT_TRUE(tile);
+        EXPECT_TRUE(id && tile);
+        if (!id || !tile || tile->child_mask != 0) return true;
+        const double texel_m = d.texel_m(id->level);
         const std::uint8_t* blocks = tile->blocks.data() + bc1_mip_offset(d.texture_size_log2, 0);
         std::vector<double> x, y;
         for (int r = 0; r < size; ++r)
@@ -96,6 +96,7 @@ ImageCheck compare_texels(const StoreUnderTest& store, const Wave& wave) {
                 if (wave.to_turn(phase) < 2 * clear) continue;
                 const Texel t = bc1_texel(blocks + 8 * (r / 4 * (size / 4) + c / 4), c % 4, r % 4);
                 ++check.texels;
+                check.deepest += id->level == d.texture_deepest_level;
                 check.bare += !t.opaque;
                 const double off = (t.red + 255 - t.blue) / 2 - Wave::level(phase);
                 check.worst = std::max(check.worst, std::abs(off));
@@ -117,7 +118,8 @@ struct ImageSetup {
     std::vector<std::array<int, 4>> parts = {};
     std::vector<std::string> arguments = {};
     double rise = 3;
-    int half_pixels = 0;  ///< of the nearest kernel
+    int half_pixels = 0;                  ///< of the nearest kernel
+    std::vector<SampleGrid> insets = {};  ///< finer images of the same wave
 };
 
 void expect_wave_in_place(const ImageSetup& in, const Wave& wave) {
@@ -135,6 +137,10 @@ void expect_wave_in_place(const ImageSetup& in, const Wave& wave) {
         arguments.push_back(in.png ? write_placed_png(folder.file("in"), name, part, level)
                                    : write_placed_image(folder.file("in"), name, part, in.matrix, level));
     }
+    for (const SampleGrid& inset : in.insets)
+        arguments.push_back(
+            write_placed_image(folder.file("in"), "inset" + std::to_string(arguments.size()), inset, true,
+                               [&](int i, int j) { return Wave::level(wave.phase(inset.x(i, j), inset.y(i, j))); }));
     arguments.insert(arguments.end(), in.arguments.begin(), in.arguments.end());
     build_store_from(arguments, folder.file("s.scree"));
     const StoreUnderTest store(folder.file("s.scree"));
@@ -142,6 +148,11 @@ void expect_wave_in_place(const ImageSetup& in, const Wave& wave) {
     const double moved_px = check.sum / check.squares;
     EXPECT_GT(check.texels, 20000);
     EXPECT_EQ(check.bare, 0);
+    if (!in.insets.empty()) {
+        ASSERT_TRUE(store.dataset().coarsest_texture_level.has_value());
+        EXPECT_GT(check.deepest, 3000) << "on the inset's side";
+        EXPECT_GT(check.texels - check.deepest, 20000) << "on the other";
+    }
     EXPECT_LT(std::abs(moved_px), kBoundSamples);
     // Half a level in the mean; a texel within a step of BC1's five bits besides what both roundings to bytes may take.
     const auto texels = static_cast<double>(check.texels);
@@ -215,6 +226,16 @@ TEST(PlacementOfImagery, OfMosaicsAtTheirJoints) {
     in.image = kImage.turned(-10);
     in.matrix = true;
     expect_image_in_place(in);
+}
+
+TEST(PlacementOfImagery, OfBothSidesOfAStepOfResolution) {
+    ImageSetup in{of_areas(north_up("EPSG:32633", 452300, 5298810, 9.3, 330, 330))};
+    in.arguments = {"--texture-size", "64"};
+    const SampleGrid fine = of_areas(north_up("EPSG:32633", 453417.2, 5297633.1, 1.13, 230, 190));
+    for (const SampleGrid& inset : {fine, fine.turned(33)}) {
+        in.insets = {inset};
+        expect_image_in_place(in);
+    }
 }
 
 }  // namespace

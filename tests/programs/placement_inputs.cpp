@@ -155,6 +155,30 @@ void write_dted(const std::string& path, const SampleGrid& g, const SampleValue&
     open_output(path) << file;
 }
 
+// USGS, "Standards for Digital Elevation Models", part 2: profiles from the west, each from south to north, in records
+// of 1024 characters.
+void write_usgs_dem(const std::string& path, const SampleGrid& g, const SampleValue& value) {
+    constexpr std::size_t kRecord = 1024;
+    constexpr int kMostRows = 146;  // that a profile's first record has room for
+    require(g.height <= kMostRows, path);
+    std::string file(144, ' ');
+    file += fmt::format("{:6}{:6}{:6}{:6}", 1, 1, 1, epsg_of(g.crs) - 32600);
+    file.resize(528, ' ');
+    file += fmt::format("{:6}{:6}{:6}", 2, 2, 4);
+    file.resize(816, ' ');
+    file += fmt::format("{:12.6E}{:12.6E}{:12.6E}{:6}{:6}", g.column_x, -g.row_y, 1.0, 1, g.width);
+    file.resize(890, ' ');
+    file += " 3";
+    file.resize(kRecord, ' ');
+    for (int c = 0; c < g.width; ++c) {
+        file += fmt::format("{:6}{:6}{:6}{:6}{:24.15E}{:24.15E}{:24.15E}{:24.15E}{:24.15E}", 1, c + 1, g.height, 1,
+                            g.x(c, 0), g.y(0, g.height - 1), 0.0, 0.0, 0.0);
+        for (int r = g.height - 1; r >= 0; --r) file += fmt::format("{:6}", static_cast<int>(value(c, r)));
+        file.resize((static_cast<std::size_t>(c) + 2) * kRecord, ' ');
+    }
+    open_output(path) << file;
+}
+
 void write_pixels(const std::string& path, const SampleGrid& g, int channels, OIIO::TypeDesc type, const void* pixels) {
     const auto out = OIIO::ImageOutput::create(path);
     require(out && out->open(path, OIIO::ImageSpec(g.width, g.height, channels, type)) &&
@@ -234,6 +258,9 @@ std::string write_placed_heights(const std::string& folder, const std::string& n
         case HeightFormat::dted:
             write_dted(stem + ".dt0", g, value);
             return stem + ".dt0";
+        case HeightFormat::usgs_dem:
+            write_usgs_dem(stem + ".dem", g, value);
+            return stem + ".dem";
         case HeightFormat::png: {
             const auto samples = samples_of<std::uint16_t>(g, value);
             write_pixels(stem + ".png", g, 1, OIIO::TypeDesc::UINT16, samples.data());
@@ -245,6 +272,25 @@ std::string write_placed_heights(const std::string& folder, const std::string& n
             if (format == HeightFormat::world_file_tiff) write_world_file(stem + ".tfw", g);
             return stem + ".tif";
     }
+}
+
+std::vector<PlacedExample> placed_grid_examples() {
+    const SampleGrid points = north_up("EPSG:32633", 452345.5, 5298765.25, 30, 75, 67);
+    SampleGrid areas = points;
+    areas.area = true;
+    SampleGrid oblong = areas;
+    oblong.row_y = -41;
+    const std::vector<std::string> utm{"--assume-crs", "EPSG:32633"};
+    return {{HeightFormat::ascii_corner, areas, utm},
+            {HeightFormat::ascii_corner, oblong, utm},
+            {HeightFormat::ascii_center, areas, utm},
+            {HeightFormat::ascii_center, oblong, utm},
+            {HeightFormat::float_corner, areas, utm},
+            {HeightFormat::float_center, areas, utm},
+            {HeightFormat::bil, areas, utm},
+            {HeightFormat::usgs_dem, points, {}},
+            {HeightFormat::dted, north_up("EPSG:4326", 14, 48, 1.0 / 120, 121, 121), {}},
+            {HeightFormat::hgt, north_up("EPSG:4326", -71, -30, 1.0 / 600, 601, 1201, 1.0 / 1200), {}, 27}};
 }
 
 std::string write_placed_image(const std::string& folder, const std::string& name, const SampleGrid& g, bool matrix,

@@ -46,12 +46,24 @@ enum class HeightFormat {
     bil,              ///< .bil of 16 bits, ULXMAP
     hgt,              ///< named by its corner
     dted,
-    png  ///< 16 bits, world file
+    usgs_dem,  ///< UTM on WGS 84, heights in whole metres
+    png        ///< 16 bits, world file
 };
 
 /// `name` without an extension; .hgt takes its name from the place. Returns the path. Sidecars name no CRS.
 std::string write_placed_heights(const std::string& folder, const std::string& name, HeightFormat format,
                                  const SampleGrid& grid, const SampleValue& value);
+
+/// One for each way in which a format says where it lies; between them every row of grid_formats() has one
+/// (every_format_test.cpp).
+struct PlacedExample {
+    HeightFormat format = HeightFormat::striped;
+    SampleGrid grid;
+    std::vector<std::string> arguments;  ///< of a build: the CRS that the format cannot name
+    int steps = 100;                     ///< metres from sample to sample that its heights have room for
+};
+std::vector<PlacedExample> placed_grid_examples();
+
 /// GeoTIFF with areas for pixels (or points, as the grid says), 8 bits. `level`: of red; blue is 255 less that.
 std::string write_placed_image(const std::string& folder, const std::string& name, const SampleGrid& grid, bool matrix,
                                const SampleValue& level);

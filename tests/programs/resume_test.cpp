@@ -42,8 +42,8 @@ protected:
         fs::create_directory(folder_.file("later"));
         dem_ = folder_.file("dem.tif");
         write_heights(dem_, hills(129, 513, 8));
-        north_ = image("north.tif", 480, 1100, 0, 0, 0);
-        south_ = image("south.tif", 500, 900, 10, 2700, 60);
+        north_ = image("north.tif", 520, 1100, 0, 0, 0);
+        south_ = image("south.tif", 520, 1000, 10, 2700, 60);
     }
     std::string image(const std::string& name, int width, int height, double x, double y, int shade) const {
         const Place place{400000 + x, 5300000 - y, 2.5, 32633, true};

@@ -217,8 +217,6 @@ TEST_F(Updates, SayWhatStandsInTheWay) {
     refused({"--remove", "base.tif", there[0], there[1]}, 2, "no source of heights");
     const std::string far = dem("far.tif", 50, 50, 8, 3000, 0);
     refused({far, there[0], there[1]}, 2, "lattice");
-    const std::string fine = image("fine.tif", 100, 100, 700, 300, 90, 32633, 0.5);
-    refused({"--imagery", fine, there[0], there[1]}, 2, "levels");
     std::ofstream(folder_.file("junk.tif")) << "no picture";
     refused({"--imagery", folder_.file("junk.tif"), there[0], there[1]}, 3, "junk.tif");
     EXPECT_EQ(scree({"update", folder_.file("none.scree"), patch}).exit_code, 3);

@@ -9,6 +9,7 @@
 
 #include "common/cli/arguments.h"
 #include "common/report.h"
+#include "common/store/height_codec.h"
 #include "tools/cli/dataset_label.h"
 #include "tools/cli/height_options.h"
 #include "tools/pyramid/build_record.h"
@@ -23,6 +24,19 @@ const std::map<std::string, Kernel> kKernels = {
 
 const std::map<std::string, TextureQuality> kTextureQualities = {{"normal", TextureQuality::normal},
                                                                  {"high", TextureQuality::high}};
+
+std::map<std::string, HeightCodec> height_codec_choices() {
+    std::map<std::string, HeightCodec> choices;
+    for (const NamedHeightCodec& named : height_codecs()) choices[named.name] = named.codec;
+    return choices;
+}
+
+// "raw|plane", by number.
+std::string height_codec_names() {
+    std::string names;
+    for (const NamedHeightCodec& named : height_codecs()) names += (names.empty() ? "" : "|") + std::string(named.name);
+    return names;
+}
 
 void print_plan(const BuildPlan& plan) {
     const Dataset& d = plan.dataset;
@@ -90,6 +104,10 @@ int run_build(int argc, char** argv) {
         ->default_str("normal");
     app.add_option("--height-quantum", options.height_quantum_m,
                    "Metres of the height unit; default: the source's own for integers, 1/64 m otherwise");
+    app.add_option("--height-codec", options.height_codec, "How height tiles are packed; every one is without loss")
+        ->transform(CLI::CheckedTransformer(height_codec_choices(), CLI::ignore_case).description(""))
+        ->type_name(height_codec_names())
+        ->default_str("plane");
     app.add_option("--threads", options.threads, "0: one a core")->capture_default_str()->check(CLI::Range(0, 1024));
     app.add_option("--memory", memory, "Ceiling of resident memory, at least 192M")->capture_default_str();
     app.add_option("--attribution", options.attribution, "Text shown with the terrain");

@@ -1,6 +1,7 @@
 #include "tools/cli/info_command.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <array>
@@ -97,6 +98,12 @@ int run_info(int argc, char** argv) {
         fmt::print("  textures   {} levels of {}^2, finest texel {} m, {} tiles, {}\n", d.texture_deepest_level + 1,
                    d.texture_size(), d.texel_m(d.texture_deepest_level), contents->texture_rows,
                    d.has_imagery ? "imagery" : "tint");
+        if (d.coarsest_texture_level)
+            fmt::print(
+                "  depths     textures end at levels {} .. {}, of {} .. {} m: depth varies by place; {} tiles a "
+                "level\n",
+                *d.coarsest_texture_level, d.texture_deepest_level, d.texel_m(*d.coarsest_texture_level),
+                d.texel_m(d.texture_deepest_level), fmt::join(contents->texture_rows_of_level, ", "));
         fmt::print("  bytes      {} in the file: {} heights, {} textures\n", contents->file_bytes,
                    contents->height_bytes, contents->texture_bytes);
         for (const SourceRecord& s : d.sources)
@@ -136,6 +143,8 @@ int run_info(int argc, char** argv) {
         {"levels", l.deepest_level + 1},
         {"coarsest_leaf_level", d.least_leaf_level()},
         {"texture_levels", d.texture_deepest_level + 1},
+        {"coarsest_texture_level", d.least_texture_level()},
+        {"texture_tiles_of_level", contents->texture_rows_of_level},
         {"roots", {l.root_rows, l.root_columns}},
         {"tile_size", l.tile_samples()},
         {"texture_size", d.texture_size()},

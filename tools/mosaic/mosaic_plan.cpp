@@ -470,13 +470,12 @@ private:
         auto layers = group_layers(plan_.imagery);
         if (!layers) return layers.error();
         plan_.image_layers = std::move(*layers);
-        double finest = std::numeric_limits<double>::infinity();
-        for (const Layer& layer : plan_.image_layers) {
-            auto size = cell_size(layer, plan_.imagery[layer.members.front().file].path);
+        for (const PlacedFile& file : plan_.imagery) {
+            const Layer alone{file.where, file.crs, file.info.width, file.info.height, false, {}};
+            auto size = cell_size(alone, file.path);
             if (!size) return size.error();
-            finest = std::min(finest, size->smaller());
+            plan_.pixel_m.push_back(size->smaller());
         }
-        plan_.finest_pixel_m = plan_.imagery.empty() ? 0 : finest;
         return {};
     }
 

@@ -43,7 +43,7 @@ struct MosaicPlan {
     std::vector<int> layer_level;  ///< of each height layer: the coarsest level that loses nothing of it
     bool heights_copied = false;   ///< every height sample is a lattice point: nothing is resampled
     bool same_units = false;       ///< one scale and offset for all files and no conversion: raw values may be kept
-    double finest_pixel_m = 0;     ///< of the imagery, at its middle; 0 without imagery
+    std::vector<double> pixel_m;   ///< of each image, at its middle: the smaller side
     std::vector<std::string> warnings;
 
     Lattice base_lattice() const;

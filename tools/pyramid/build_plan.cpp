@@ -13,6 +13,7 @@
 #include "tools/pyramid/build_record.h"
 #include "tools/pyramid/height_pyramid.h"
 #include "tools/pyramid/height_spool.h"
+#include "tools/pyramid/level_imagery.h"
 #include "tools/pyramid/texture_stage.h"
 #include "tools/source/fingerprint.h"
 #include "tools/source/isolated_decoder.h"
@@ -69,25 +70,104 @@ std::int64_t widest_band_bytes(const std::vector<PlacedFile>& files, std::int64_
     return most;
 }
 
+// A file's box, or where it is turned or in another CRS the boxes of blocks of it, in finest cells; with a texel around
+// those, for what their sides do between the points that are looked at.
+Result<void> mark_image(const BuildPlan& plan, const PlacedFile& file, int level, TextureDepth& textures) {
+    const Lattice& l = plan.dataset.lattice;
+    const double rim = file.where.raster_is_point ? 0 : 0.5;
+    const double first = -rim, last_column = static_cast<double>(file.info.width - 1) + rim,
+                 last_row = static_cast<double>(file.info.height - 1) + rim;
+    const bool aligned = file.where.axis_aligned() && file.crs.same_as(plan.mosaic.crs);
+    constexpr double kBlock = 128;
+    const double across = aligned ? last_column - first : kBlock, down = aligned ? last_row - first : kBlock;
+    const double around = aligned ? 0 : plan.dataset.texel_m(level) / l.spacing_m;
+    auto transform = CrsTransform::make(file.crs, plan.mosaic.crs);
+    if (!transform) return transform.error();
+    std::vector<double> x, y;
+    for (double row = first; row < last_row; row += down)
+        for (double column = first; column < last_column; column += across) {
+            x.clear();
+            y.clear();
+            for (const double v : {0.0, 0.5, 1.0})
+                for (const double u : {0.0, 0.5, 1.0}) {
+                    const double c = std::min(column + u * across, last_column), r = std::min(row + v * down, last_row);
+                    x.push_back(file.where.x(c, r));
+                    y.push_back(file.where.y(c, r));
+                }
+            if (!aligned) transform->apply(x, y);
+            double west = std::numeric_limits<double>::infinity(), north = west, east = -west, south = -west;
+            for (std::size_t k = 0; k < x.size(); ++k) {
+                const double i = l.i_of(x[k]), j = l.j_of(y[k]);
+                if (!std::isfinite(i) || !std::isfinite(j)) continue;
+                west = std::min(west, i);
+                east = std::max(east, i);
+                north = std::min(north, j);
+                south = std::max(south, j);
+            }
+            if (west <= east) textures.mark(west - around, north - around, east + around, south + around, level);
+        }
+    return {};
+}
+
+// Which textures are refined: those over images that ask for it.
+Result<void> plan_textures(BuildPlan& plan) {
+    Dataset& d = plan.dataset;
+    const MosaicPlan& m = plan.mosaic;
+    const double cell_m = m.base_lattice().spacing_m;
+    TextureDepth textures(d.lattice, d.texture_size_log2, texture_depth(d, cell_m, cell_m));
+    for (std::size_t k = 0; k < m.imagery.size(); ++k) {
+        const int level = texture_depth(d, cell_m, m.pixel_m[k]);
+        if (!tile_key(d.lattice, {level, 0, 0}))
+            return input_error(
+                fmt::format("{}: imagery of {} m a pixel needs texture level {}, beyond the format's "
+                            "keys",
+                            m.imagery[k].path, m.pixel_m[k], level));
+        plan.image_level.push_back(level);
+        if (auto ok = mark_image(plan, m.imagery[k], level, textures); !ok) return ok;
+    }
+    textures.finish();
+    d.texture_deepest_level = textures.deepest();
+    if (textures.varies()) d.coarsest_texture_level = textures.coarsest();
+    plan.textures = std::move(textures);
+    return {};
+}
+
+// Texels side by side that are made at once under the coarsest level, and what that takes: as many as there is memory
+// for, because images are decoded in whole rows.
+std::int64_t plan_deep_textures(const BuildOptions& o, std::int64_t others, BuildPlan& plan) {
+    const Dataset& d = plan.dataset;
+    if (!plan.textures.varies()) return 0;
+    const auto bytes = [&](std::int64_t wide) { return TextureStage::bytes_needed(d, wide) + wide * 64 * 4; };
+    std::int64_t wide = TextureStage::least_deep_texels(d);
+    const auto most = static_cast<std::int64_t>(
+        std::ceil(static_cast<double>(d.lattice.cells_x) * d.lattice.spacing_m / d.texel_m(d.texture_deepest_level)));
+    while (wide < most && others + bytes(2 * wide) <= o.memory_bytes) wide *= 2;
+    plan.deep_texels_wide = wide;
+    return bytes(wide);
+}
+
 void plan_resources(const BuildOptions& o, BuildPlan& plan) {
     const Dataset& d = plan.dataset;
     const MosaicPlan& m = plan.mosaic;
     const Lattice base = m.base_lattice();
     const std::int64_t width = base.cells_x + 1, rows = base.cells_y + 1;
-    std::int64_t heights = height_pyramid_bytes(base) + width * 32 * 8;
+    std::int64_t heights = height_pyramid_bytes(base, o.height_codec) + width * 32 * 8;
     if (plan.heights_in_place)
         heights += 2 * m.heights.front().info.unit_bytes;
     else
         heights = std::max(
             {heights, widest_band_bytes(m.heights, 12), width * 64 * 8 + threads_of(o) * kSamplingBytesAThread});
     const std::int64_t texels_wide =
-        base.cells_x * static_cast<std::int64_t>(std::ceil(base.spacing_m / d.texel_m(d.texture_deepest_level)));
+        base.cells_x * static_cast<std::int64_t>(std::ceil(base.spacing_m / d.texel_m(d.least_texture_level())));
     std::int64_t texture = TextureStage::bytes_needed(d, texels_wide);
     if (!m.imagery.empty()) texture += texels_wide * 64 * 4 + threads_of(o) * kSamplingBytesAThread;
+    // Pixels of a band of tiles that go deeper, as they come up from there.
+    if (plan.textures.varies()) texture += texels_wide * d.texture_size() * 4;
+    texture += plan_deep_textures(o, kProcessBytes + decoder_usage().peak_rss_bytes + texture, plan);
     plan.memory_bytes = kProcessBytes + decoder_usage().peak_rss_bytes + std::max(heights, texture);
     plan.temporary_bytes = HeightSpool::bytes_needed(width, rows, plan.wide_heights);
     if (!plan.heights_in_place) plan.temporary_bytes += height_stack_bytes(m.heights);
-    plan.temporary_bytes += image_stack_bytes(m.imagery);
+    plan.temporary_bytes += LevelImagery::temporary_bytes(plan);
 
     double height_tiles = 0, texture_tiles = 0;
     for (int level = 0; level <= std::max(base.deepest_level, d.texture_deepest_level); ++level) {
@@ -95,7 +175,7 @@ void plan_resources(const BuildOptions& o, BuildPlan& plan) {
         const double tiles = std::ceil(static_cast<double>(base.cells_x) / extent) *
                              std::ceil(static_cast<double>(base.cells_y) / extent);
         if (level <= base.deepest_level) height_tiles += tiles;
-        if (level <= d.texture_deepest_level) texture_tiles += tiles;
+        if (level <= d.texture_deepest_level) texture_tiles += static_cast<double>(plan.textures.count(level));
     }
     for (std::size_t k = 0; k < m.height_layers.size(); ++k) {
         if (m.layer_level[k] <= base.deepest_level) continue;
@@ -107,7 +187,7 @@ void plan_resources(const BuildOptions& o, BuildPlan& plan) {
     }
     const double samples = base.tile_samples() * base.tile_samples();
     plan.store_bytes_estimate =
-        static_cast<std::int64_t>(height_tiles * (samples * 2 + 200) +
+        static_cast<std::int64_t>(height_tiles * (samples * named(o.height_codec).bytes_a_sample + 200) +
                                   texture_tiles * static_cast<double>(bc1_chain_bytes(d.texture_size_log2)) * 1.02);
 }
 
@@ -242,11 +322,7 @@ Result<BuildPlan> plan_build(const BuildOptions& o) {
         }
     }
     d.has_imagery = !m.imagery.empty();
-    const double cell_m = m.base_lattice().spacing_m, source_texel = d.has_imagery ? m.finest_pixel_m : cell_m;
-    d.texture_deepest_level = texture_depth(d, cell_m, source_texel);
-    if (!tile_key(d.lattice, {d.texture_deepest_level, 0, 0}))
-        return input_error(fmt::format("imagery of {} m a pixel needs texture level {}, beyond the format's keys",
-                                       source_texel, d.texture_deepest_level));
+    if (auto ok = plan_textures(plan); !ok) return ok.error();
     choose_ways(plan);
     plan_resources(o, plan);
     if (plan.memory_bytes > o.memory_bytes)

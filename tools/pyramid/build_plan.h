@@ -10,14 +10,17 @@
 
 #include "common/dataset.h"
 #include "common/result.h"
+#include "common/store/height_codec.h"
 #include "tools/mosaic/mosaic_plan.h"
 #include "tools/pyramid/bc1_encoder.h"
+#include "tools/pyramid/texture_depth.h"
 #include "tools/pyramid/void_fill.h"
 
 namespace scree {
 
 inline constexpr std::int64_t kMinMemoryBytes = std::int64_t{192} << 20;
 
+/// What bears on the bytes of a store must stand in the table of build_record.cpp, too: resuming and updates go by it.
 struct BuildOptions : HeightReading {
     std::vector<std::string> dems;    ///< files and folders; later ones lie on top
     std::vector<std::string> images;  ///< the same; none: a tint made from the heights
@@ -29,6 +32,7 @@ struct BuildOptions : HeightReading {
     ColourReading colours;
     FillRule fill;  ///< of interior voids; a value in metres
     std::optional<double> height_quantum_m;
+    HeightCodec height_codec = HeightCodec::plane;
     int tile_size = 33;
     int texture_size = 256;
     TextureQuality texture_quality = TextureQuality::normal;  ///< high: DXT1 takes ten to twenty times as long
@@ -53,6 +57,9 @@ struct BuildPlan {
     bool integer_heights = false;           ///< every height is an integer of the file's, nothing is resampled
     bool wide_heights = false;              ///< values do not fit float32
     Dataset dataset;                        ///< lattice, CRS, texture depth; heights still unknown
+    TextureDepth textures;                  ///< which of their tiles are refined
+    std::vector<int> image_level;           ///< of each image: the texture level that it asks for
+    std::int64_t deep_texels_wide = 0;      ///< where textures go deeper, so many are made side by side
     std::int64_t memory_bytes = 0;          ///< estimate of the peak
     std::int64_t temporary_bytes = 0;       ///< disk, during the build
     std::int64_t store_bytes_estimate = 0;  ///< an upper figure

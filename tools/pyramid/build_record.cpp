@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <functional>
@@ -49,30 +50,77 @@ std::optional<int> parse_int(const std::string& text) {
     return value;
 }
 
-// Each sets its option from the text; false: it makes no sense.
-using Setter = std::function<bool(const std::string& text, BuildOptions& options)>;
+using Text = std::optional<std::string>;
+
+// An option both ways. It is as it is by default where there is no text.
+struct RecordedOption {
+    const char* name;  // on the command line
+    std::function<Text(const BuildOptions& options)> text;
+    std::function<bool(const std::string& text, BuildOptions& options)> set;  // false: it makes no sense
+};
+
+const BuildOptions& defaults() {
+    static const BuildOptions all;
+    return all;
+}
+
+Text text_of(const std::optional<double>& value) {
+    if (!value) return std::nullopt;
+    return fmt::format("{}", *value);
+}
 
 template <class T, class Base>
-Setter number(T Base::*field) {
-    return [field](const std::string& text, BuildOptions& o) {
-        const auto v = parse_number(text);
-        if (v) o.*field = *v;
-        return v.has_value();
-    };
+RecordedOption number(const char* name, T Base::*field) {
+    return {name, [field](const BuildOptions& o) { return o.*field == defaults().*field ? Text{} : text_of(o.*field); },
+            [field](const std::string& text, BuildOptions& o) {
+                const auto v = parse_number(text);
+                if (v) o.*field = *v;
+                return v.has_value();
+            }};
 }
-Setter size(int BuildOptions::*field) {
-    return [field](const std::string& text, BuildOptions& o) {
-        const auto v = parse_int(text);
-        if (v) o.*field = *v;
-        return v.has_value();
-    };
+RecordedOption size(const char* name, int BuildOptions::*field) {
+    return {
+        name,
+        [field](const BuildOptions& o) { return o.*field == defaults().*field ? Text{} : fmt::format("{}", o.*field); },
+        [field](const std::string& text, BuildOptions& o) {
+            const auto v = parse_int(text);
+            if (v) o.*field = *v;
+            return v.has_value();
+        }};
 }
 template <class Base>
-Setter words(std::optional<std::string> Base::*field) {
-    return [field](const std::string& text, BuildOptions& o) {
-        o.*field = text;
-        return true;
-    };
+RecordedOption words(const char* name, std::optional<std::string> Base::*field) {
+    return {name, [field](const BuildOptions& o) { return o.*field; },
+            [field](const std::string& text, BuildOptions& o) {
+                o.*field = text;
+                return true;
+            }};
+}
+template <class T>
+RecordedOption choice(const char* name, T BuildOptions::*field, std::map<std::string, T> choices) {
+    return {name,
+            [field, choices](const BuildOptions& o) {
+                for (const auto& [text, value] : choices)
+                    if (value == o.*field && value != defaults().*field) return Text{text};
+                return Text{};
+            },
+            [field, choices](const std::string& text, BuildOptions& o) {
+                const auto found = choices.find(text);
+                if (found != choices.end()) o.*field = found->second;
+                return found != choices.end();
+            }};
+}
+
+std::map<std::string, HeightCodec> height_codec_choices() {
+    std::map<std::string, HeightCodec> choices;
+    for (const NamedHeightCodec& named : height_codecs()) choices[named.name] = named.codec;
+    return choices;
+}
+
+Text stretch_text(const BuildOptions& o) {
+    const auto& stretch = o.colours.stretch;
+    if (!stretch) return std::nullopt;
+    return fmt::format("{}{},{}", stretch->spares_8bit ? kChosen : "", stretch->low, stretch->high);
 }
 
 bool set_stretch(const std::string& text, BuildOptions& o) {
@@ -81,6 +129,11 @@ bool set_stretch(const std::string& text, BuildOptions& o) {
     if (!v || v->size() != 2) return false;
     o.colours.stretch = Stretch{(*v)[0], (*v)[1], chosen};
     return true;
+}
+
+Text bands_text(const BuildOptions& o) {
+    if (o.colours.bands.empty()) return std::nullopt;
+    return fmt::format("{}", fmt::join(o.colours.bands, ","));
 }
 
 bool set_bands(const std::string& text, BuildOptions& o) {
@@ -93,45 +146,40 @@ bool set_bands(const std::string& text, BuildOptions& o) {
     return true;
 }
 
-const std::map<std::string, Setter>& setters() {
-    static const std::map<std::string, Setter> all = {
-        {"crs", words(&BuildOptions::crs)},
-        {"assume-crs", words(&BuildOptions::assume_crs)},
-        {"assume-same-datum",
+// The only place that lists them.
+const std::vector<RecordedOption>& recorded() {
+    static const std::vector<RecordedOption> all = {
+        words("crs", &BuildOptions::crs),
+        words("assume-crs", &BuildOptions::assume_crs),
+        {"assume-same-datum", [](const BuildOptions& o) { return o.assume_same_datum ? Text{"yes"} : Text{}; },
          [](const std::string& text, BuildOptions& o) { return o.assume_same_datum = text == "yes"; }},
-        {"resampling",
-         [](const std::string& text, BuildOptions& o) {
-             const auto kernel = kKernels.find(text);
-             if (kernel != kKernels.end()) o.kernel = kernel->second;
-             return kernel != kKernels.end();
-         }},
+        choice<Kernel>("resampling", &BuildOptions::kernel, kKernels),
         {"fill",
+         [](const BuildOptions& o) {
+             return fill_text(o.fill) == fill_text(defaults().fill) ? Text{} : fill_text(o.fill);
+         },
          [](const std::string& text, BuildOptions& o) {
              const auto rule = parse_fill(text);
              if (rule) o.fill = *rule;
              return rule.ok();
          }},
-        {"spacing", number<std::optional<double>>(&BuildOptions::spacing_m)},
-        {"height-scale", number<std::optional<double>>(&BuildOptions::height_scale)},
-        {"height-offset", number<double>(&BuildOptions::height_offset_m)},
-        {"vertical-crs", words(&BuildOptions::vertical_crs)},
-        {"nodata", number<std::optional<double>>(&BuildOptions::nodata)},
-        {"height-quantum", number<std::optional<double>>(&BuildOptions::height_quantum_m)},
-        {"bands", set_bands},
-        {"stretch", set_stretch},
-        {"imagery-nodata",
+        number<std::optional<double>>("spacing", &BuildOptions::spacing_m),
+        number<std::optional<double>>("height-scale", &BuildOptions::height_scale),
+        number<double>("height-offset", &BuildOptions::height_offset_m),
+        words("vertical-crs", &BuildOptions::vertical_crs),
+        number<std::optional<double>>("nodata", &BuildOptions::nodata),
+        number<std::optional<double>>("height-quantum", &BuildOptions::height_quantum_m),
+        choice<HeightCodec>("height-codec", &BuildOptions::height_codec, height_codec_choices()),
+        {"bands", bands_text, set_bands},
+        {"stretch", stretch_text, set_stretch},
+        {"imagery-nodata", [](const BuildOptions& o) { return text_of(o.colours.nodata); },
          [](const std::string& text, BuildOptions& o) {
              o.colours.nodata = parse_number(text);
              return o.colours.nodata.has_value();
          }},
-        {"texture-quality",
-         [](const std::string& text, BuildOptions& o) {
-             if (text != "high") return false;
-             o.texture_quality = TextureQuality::high;
-             return true;
-         }},
-        {"tile-size", size(&BuildOptions::tile_size)},
-        {"texture-size", size(&BuildOptions::texture_size)},
+        choice<TextureQuality>("texture-quality", &BuildOptions::texture_quality, {{"high", TextureQuality::high}}),
+        size("tile-size", &BuildOptions::tile_size),
+        size("texture-size", &BuildOptions::texture_size),
     };
     return all;
 }
@@ -148,40 +196,25 @@ Result<FillRule> parse_fill(const std::string& text) {
 }
 
 std::map<std::string, std::string> options_record(const BuildOptions& o, const std::optional<Stretch>& stretch) {
+    BuildOptions built = o;
+    built.colours.stretch = stretch;
     std::map<std::string, std::string> record;
-    const BuildOptions plain;
-    const auto text = [&](const char* name, const std::optional<std::string>& value) {
-        if (value) record[name] = *value;
-    };
-    const auto number = [&](const char* name, const std::optional<double>& value) {
-        if (value) record[name] = fmt::format("{}", *value);
-    };
-    text("crs", o.crs);
-    text("assume-crs", o.assume_crs);
-    text("vertical-crs", o.vertical_crs);
-    if (o.assume_same_datum) record["assume-same-datum"] = "yes";
-    for (const auto& [name, kernel] : kKernels)
-        if (kernel == o.kernel && kernel != plain.kernel) record["resampling"] = name;
-    if (fill_text(o.fill) != fill_text(plain.fill)) record["fill"] = fill_text(o.fill);
-    number("spacing", o.spacing_m);
-    number("height-scale", o.height_scale);
-    if (o.height_offset_m != 0) number("height-offset", o.height_offset_m);
-    number("nodata", o.nodata);
-    number("height-quantum", o.height_quantum_m);
-    if (!o.colours.bands.empty()) record["bands"] = fmt::format("{}", fmt::join(o.colours.bands, ","));
-    if (stretch)
-        record["stretch"] = fmt::format("{}{},{}", stretch->spares_8bit ? kChosen : "", stretch->low, stretch->high);
-    number("imagery-nodata", o.colours.nodata);
-    if (o.texture_quality == TextureQuality::high) record["texture-quality"] = "high";
-    if (o.tile_size != plain.tile_size) record["tile-size"] = fmt::format("{}", o.tile_size);
-    if (o.texture_size != plain.texture_size) record["texture-size"] = fmt::format("{}", o.texture_size);
+    for (const RecordedOption& option : recorded())
+        if (const Text text = option.text(built)) record[option.name] = *text;
     return record;
+}
+
+std::vector<std::string> recorded_options() {
+    std::vector<std::string> names;
+    for (const RecordedOption& option : recorded()) names.emplace_back(option.name);
+    return names;
 }
 
 Result<void> apply_record(const std::map<std::string, std::string>& record, BuildOptions& options) {
     for (const auto& [name, value] : record) {
-        const auto setter = setters().find(name);
-        if (setter == setters().end() || !setter->second(value, options))
+        const auto option = std::find_if(recorded().begin(), recorded().end(),
+                                         [&, n = name](const RecordedOption& r) { return r.name == n; });
+        if (option == recorded().end() || !option->set(value, options))
             return Error{ErrorCode::store, fmt::format("the store was built with --{} {}, which this program does not "
                                                        "know: it cannot be updated by it",
                                                        name, value)};

@@ -4,6 +4,7 @@
 
 #include <map>
 #include <string>
+#include <vector>
 
 #include "common/result.h"
 #include "tools/pyramid/build_plan.h"
@@ -12,6 +13,9 @@ namespace scree {
 
 /// `stretch`: as given or chosen.
 std::map<std::string, std::string> options_record(const BuildOptions& options, const std::optional<Stretch>& stretch);
+
+/// The names of all that can be recorded: what bears on the bytes of a store.
+std::vector<std::string> recorded_options();
 
 /// Sets the recorded options. Errors: ErrorCode::store for an option or a value that this program does not know.
 Result<void> apply_record(const std::map<std::string, std::string>& record, BuildOptions& options);

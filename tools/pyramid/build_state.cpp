@@ -38,11 +38,9 @@ std::optional<std::string> option_difference(const Json& begun, const Json& now)
 }  // namespace
 
 std::string BuildState::text() const {
-    Json json = {{"identity", identity},
-                 {"heights_done", heights_done},
-                 {"warp_rms_m", warp_rms_m},
-                 {"filled_samples", filled_samples},
-                 {"district_rows", district_rows}};
+    Json json = {{"identity", identity},           {"heights_done", heights_done},
+                 {"warp_rms_m", warp_rms_m},       {"filled_samples", filled_samples},
+                 {"district_rows", district_rows}, {"deep_rows", deep_rows}};
     if (heights_done) {
         Dataset d = dataset;
         d.texture_tiles = 1;  // unknown; a dataset has some
@@ -62,6 +60,7 @@ Result<BuildState> BuildState::from_text(const std::string& text) {
         state.warp_rms_m = json.at("warp_rms_m").get<double>();
         state.filled_samples = json.at("filled_samples").get<std::int64_t>();
         state.district_rows = json.at("district_rows").get<std::int64_t>();
+        state.deep_rows = json.at("deep_rows").get<std::int64_t>();
         if (state.heights_done) {
             auto dataset = dataset_from_json(json.at("dataset").get<std::string>());
             if (!dataset) return dataset.error();
@@ -70,7 +69,7 @@ Result<BuildState> BuildState::from_text(const std::string& text) {
     } catch (const Json::exception&) {
         return bad;
     }
-    if (state.district_rows < 0) return bad;
+    if (state.district_rows < 0 || state.deep_rows < 0) return bad;
     return state;
 }
 

@@ -17,6 +17,7 @@ struct BuildState {
     double warp_rms_m = 0;
     std::int64_t filled_samples = 0;
     std::int64_t district_rows = 0;  ///< complete, from the north
+    std::int64_t deep_rows = 0;      ///< of deep districts: all north of it are complete
 
     std::string text() const;
     /// Errors: ErrorCode::store.

@@ -149,14 +149,8 @@ private:
 
     Result<void> make_textures(double megapixels) {
         const Dataset& d = state_.dataset;
-        std::unique_ptr<ImageStack> imagery;
-        const MosaicPlan& m = plan_.mosaic;
-        if (!m.imagery.empty()) {
-            auto opened = ImageStack::open(m.imagery, m.image_layers, texel_grid(d), m.crs,
-                                           {options_.kernel, plan_.open, options_, options_.out});
-            if (!opened) return opened.error();
-            imagery = std::move(*opened);
-        }
+        auto imagery = LevelImagery::open(plan_, options_);
+        if (!imagery) return imagery.error();
         TextureStageJob job;
         job.dataset = d;
         job.base = base_;
@@ -164,7 +158,9 @@ private:
         job.heights = [&](TileId id, TileRow& row) {
             return writer_->read(TileKind::height, *tile_key(d.lattice, id), row);
         };
-        job.imagery = imagery.get();
+        job.depth = &plan_.textures;
+        job.imagery = &*imagery;
+        job.deep_texels_wide = plan_.deep_texels_wide;
         job.writer = writer_.get();
         job.quality = options_.texture_quality;
         job.stop = &stop_;
@@ -172,12 +168,26 @@ private:
         rows_ = stage.district_rows();
         while (state_.district_rows < rows_) {
             if (stop_) return Error{ErrorCode::interrupted, "stopped"};
+            if (auto ok = make_deep_rows(stage); !ok) return ok;
             if (auto ok = stage.build_districts(0, state_.district_rows, stage.district_columns(), 1); !ok) return ok;
             ++state_.district_rows;
             if (auto ok = writer_->checkpoint(state_.text()); !ok) return ok;
             progress_.add(megapixels / static_cast<double>(rows_));
         }
         return stage.build_crown();
+    }
+
+    // Deep districts under the next row of districts, a checkpoint a row of them.
+    Result<void> make_deep_rows(TextureStage& stage) {
+        const int down = state_.dataset.least_texture_level() - seed_level(state_.dataset);
+        const std::int64_t end = std::min((state_.district_rows + 1) << down, stage.deep_rows());
+        for (std::int64_t row = std::max(state_.deep_rows, state_.district_rows << down); row < end; ++row) {
+            if (!stage.has_deep(row)) continue;
+            if (auto ok = stage.build_deep_row(row); !ok) return ok;
+            state_.deep_rows = row + 1;
+            if (auto ok = writer_->checkpoint(state_.text()); !ok) return ok;
+        }
+        return {};
     }
 
     Result<void> finish(BuildReport& report) {

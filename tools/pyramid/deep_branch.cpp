@@ -7,7 +7,6 @@
 #include <limits>
 #include <mutex>
 
-#include "common/store/height_codec.h"
 #include "tools/pyramid/sample_range.h"
 
 namespace scree {
@@ -212,7 +211,7 @@ Result<BranchSummary> DeepBranches::leaf(TileId id, const Place& place) const {
                                  (id.y - (above.y << down)) * m, finest, errors, 0);
     }
     tile.header.own = summary.bounds;
-    if (auto ok = sink_(id, encode_height_tile(tile, n, HeightCodec::plane)); !ok) return ok.error();
+    if (auto ok = sink_(id, tile); !ok) return ok.error();
     return summary;
 }
 
@@ -257,7 +256,7 @@ Result<BranchSummary> DeepBranches::refined(TileId id, const Place& place) const
     if (!summary.exists) return summary;
     summary.bounds = bounds_over(existing, tile.samples, summary.ancestor_error[static_cast<std::size_t>(id.level)], n);
     tile.header.own = summary.bounds;
-    if (auto ok = sink_(id, encode_height_tile(tile, n, HeightCodec::plane)); !ok) return ok.error();
+    if (auto ok = sink_(id, tile); !ok) return ok.error();
     return summary;
 }
 

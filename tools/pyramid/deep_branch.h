@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/dataset.h"
+#include "common/height_tile.h"
 #include "common/mesh/geometric_error.h"
 #include "tools/mosaic/stack.h"
 #include "tools/pyramid/deep_tree.h"
@@ -59,7 +60,7 @@ struct BranchSummary {
 };
 
 /// Takes finished tiles; called from several threads.
-using TileSink = std::function<Result<void>(TileId id, std::vector<std::uint8_t> payload)>;
+using TileSink = std::function<Result<void>(TileId id, const HeightTile& tile)>;
 
 class DeepBranches {
 public:

@@ -120,9 +120,8 @@ public:
         }
         valid_.resize(static_cast<std::size_t>((m_ + 1) * width_));
         if (job.deep_tree != nullptr)
-            branches_.emplace(
-                job.finest, *job.deep_tree, *job.deep_heights,
-                [this](TileId id, std::vector<std::uint8_t> payload) { return put(id, std::move(payload)); });
+            branches_.emplace(job.finest, *job.deep_tree, *job.deep_heights,
+                              [this](TileId id, const HeightTile& tile) { return put(id, encoded(tile)); });
     }
 
     Result<HeightPyramidResult> run() {
@@ -303,7 +302,7 @@ private:
         for (TileDraft& draft : std::span(drafts).first(count)) {
             if (draft.deeper) continue;
             draft.tile.header.own = draft.record->bounds;
-            draft.record->payload = encode_height_tile(draft.tile, n_, HeightCodec::plane);
+            draft.record->payload = encoded(draft.tile);
         }
         give_back(std::move(drafts));
     }
@@ -453,7 +452,7 @@ private:
         record.bounds = bounds_over(existing, tile.samples, all.ancestor_error[static_cast<std::size_t>(id.level)], n_);
         tile.presence.clear();
         tile.header.own = record.bounds;
-        record.payload = encode_height_tile(tile, n_, HeightCodec::plane);
+        record.payload = encoded(tile);
         record.branch = all;
         return {};
     }
@@ -491,7 +490,7 @@ private:
         tile.header.leaf_mask = parent.leaf_mask;
         tile.header.own = record.bounds;
         tile.header.children = parent.children;
-        record.payload = encode_height_tile(tile, n_, HeightCodec::plane);
+        record.payload = encoded(tile);
     }
 
     // --- finished tiles ---
@@ -508,11 +507,15 @@ private:
         return put(id, std::move(record.payload));
     }
 
+    // The codec is named here and in put() alone: a row's number must be that of what made its payload. Any thread.
+    std::vector<std::uint8_t> encoded(const HeightTile& tile) const { return encode_height_tile(tile, n_, job_.codec); }
+
     // Any thread.
     Result<void> put(TileId id, std::vector<std::uint8_t> payload) {
         ++tile_count_;
+        if (job_.textures != nullptr) say_where_textures_end(payload, id, *job_.textures);
         if (job_.index != nullptr) job_.index->note(id, payload);
-        return job_.writer->put(TileKind::height, *tile_key(lattice_, id), static_cast<int>(HeightCodec::plane),
+        return job_.writer->put(TileKind::height, *tile_key(lattice_, id), static_cast<int>(job_.codec),
                                 std::move(payload));
     }
 
@@ -535,12 +538,19 @@ private:
 
 }  // namespace
 
-std::int64_t height_pyramid_bytes(const Lattice& lattice) {
+void say_where_textures_end(std::span<std::uint8_t> payload, TileId id, const TextureDepth& textures) {
+    std::uint8_t children = 0;
+    for (int q = 0; q < 4; ++q)
+        if (textures.ends(child_of(id, q))) children = static_cast<std::uint8_t>(children | 1 << q);
+    set_texture_ends(payload, textures.ends(id), children);
+}
+
+std::int64_t height_pyramid_bytes(const Lattice& lattice, HeightCodec codec) {
     const std::int64_t m = lattice.tile_cells();
     const std::int64_t width = lattice.cells_x + 2 * m;
     const std::int64_t bands = 2 * (m + 1) * width * 4 + (m + 1) * width;
     const std::int64_t corners = (lattice.cells_x / m + 2) * (lattice.cells_y / m + 2) * 4;
-    const std::int64_t payload = 2 * (m + 1) * (m + 1) + 512;
+    const std::int64_t payload = named(codec).bytes_a_sample * (m + 1) * (m + 1) + 512;
     const std::int64_t records =
         width / m * (static_cast<std::int64_t>(sizeof(TileRecord) + 2 * sizeof(ParentRecord)) + payload);
     // A thread's rows and drafts.

@@ -6,12 +6,15 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <span>
 
 #include "common/dataset.h"
+#include "common/store/height_codec.h"
 #include "tools/pyramid/deep_branch.h"
 #include "tools/pyramid/height_index.h"
 #include "tools/pyramid/height_quantizer.h"
 #include "tools/pyramid/height_spool.h"
+#include "tools/pyramid/texture_depth.h"
 #include "tools/pyramid/tile_writer.h"
 
 namespace scree {
@@ -27,7 +30,9 @@ struct HeightPyramidJob {
     const DeepTree* deep_tree = nullptr;
     const DeepHeights* deep_heights = nullptr;
     Lattice finest{};
-    HeightIndex* index = nullptr;  ///< notes every tile; null: nobody wants to know
+    HeightCodec codec = HeightCodec::plane;
+    const TextureDepth* textures = nullptr;  ///< tiles say where these end. Null: of no consequence
+    HeightIndex* index = nullptr;            ///< notes every tile; null: nobody wants to know
 };
 
 struct HeightPyramidResult {
@@ -39,8 +44,11 @@ struct HeightPyramidResult {
 };
 
 /// Bytes that build_height_pyramid holds.
-std::int64_t height_pyramid_bytes(const Lattice& lattice);
+std::int64_t height_pyramid_bytes(const Lattice& lattice, HeightCodec codec);
 
 Result<HeightPyramidResult> build_height_pyramid(const HeightPyramidJob& job);
+
+/// Of a height tile's payload.
+void say_where_textures_end(std::span<std::uint8_t> payload, TileId id, const TextureDepth& textures);
 
 }  // namespace scree

@@ -214,6 +214,8 @@ Result<HeightStageResult> build_heights(const BuildPlan& plan, const BuildOption
     };
     job.index = &index;
     job.finest = plan.dataset.lattice;
+    job.textures = &plan.textures;
+    job.codec = options.height_codec;
     if (deep) {
         job.deep_tree = &deep->tree;
         job.deep_heights = &*deep->heights;

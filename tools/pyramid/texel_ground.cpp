@@ -24,18 +24,19 @@ struct TexelGround::Tile {
     std::unordered_map<TileId, std::vector<std::uint8_t>, TileIdHash> leaves;
 };
 
-TexelGround::TexelGround(const Dataset& dataset, const Lattice& base, const HeightIndex& index, HeightRowReader read)
+TexelGround::TexelGround(const Dataset& dataset, const Lattice& base, const HeightIndex& index, HeightRowReader read,
+                         int texture_level)
     : dataset_(dataset),
       base_(base),
       index_(index),
       read_(std::move(read)),
       tint_({dataset.min_height_m, dataset.max_height_m, base.spacing_m}),
-      texels_a_cell_(std::llround(base.spacing_m / dataset.texel_m(dataset.texture_deepest_level))) {}
+      texels_a_cell_(std::llround(base.spacing_m / dataset.texel_m(texture_level))) {}
 
 TexelGround::~TexelGround() = default;
 
 Result<void> TexelGround::finish(std::int64_t column, std::int64_t row, std::int64_t columns, std::int64_t rows,
-                                 std::uint8_t* rgba) {
+                                 std::uint8_t* rgba, std::int64_t row_bytes) {
     const std::int64_t side = base_.tile_cells() * texels_a_cell_;  // texels along a tile
     const std::int64_t first = column / side, end = (column + columns + side - 1) / side;
     for (std::int64_t x = first; x < end; ++x) {
@@ -54,8 +55,8 @@ Result<void> TexelGround::finish(std::int64_t column, std::int64_t row, std::int
             const std::int64_t south = std::min((r / side + 1) * side, row + rows);
             const Rectangle part{west, r, east - west, south - r};
             const TileId id{base_.deepest_level, x, r / side};
-            std::uint8_t* corner = rgba + ((r - row) * columns + west - column) * 4;
-            if (auto ok = finish_part(*tiles[static_cast<std::size_t>(k)], id, part, corner, columns * 4); !ok) {
+            std::uint8_t* corner = rgba + (r - row) * row_bytes + (west - column) * 4;
+            if (auto ok = finish_part(*tiles[static_cast<std::size_t>(k)], id, part, corner, row_bytes); !ok) {
                 const std::lock_guard lock(mutex);
                 if (outcome) outcome = ok;
                 return;
@@ -184,6 +185,48 @@ bool TexelGround::leaf_present(const Tile& tile, TileId id, std::int64_t column,
     const LatticePoint corner = l.corner(id);
     const std::int64_t step = l.step(id.level);
     return leaf->second[static_cast<std::size_t>((j - corner.j) / step * l.tile_cells() + (i - corner.i) / step)] != 0;
+}
+
+// Cells of the leaf under texture tile `id` that hold the centre of a texel of the deepest level.
+bool TexelGround::any_present(const HeightTile& tile, TileId leaf, TileId id) const {
+    const int n = base_.tile_cells_log2, down = id.level - leaf.level;
+    const std::int64_t m = std::int64_t{1} << n;
+    const auto first = [&](std::int64_t at, std::int64_t of_leaf) {
+        const std::int64_t inside = at - (of_leaf << down);  // tiles like it in the leaf
+        return down <= n ? inside << (n - down) : inside >> (down - n);
+    };
+    const std::int64_t i0 = first(id.x, leaf.x), j0 = first(id.y, leaf.y);
+    const std::int64_t side = down <= n ? std::int64_t{1} << (n - down) : 1;
+    // A texel of more than a cell: its centre is a corner of cells, and counts as the one east and south of it.
+    const int texel_log2 = n - (dataset_.texture_deepest_level - leaf.level) - dataset_.texture_size_log2;
+    const auto hit = [&](std::int64_t cell) {
+        return texel_log2 <= 0 || (cell & ((std::int64_t{1} << texel_log2) - 1)) == std::int64_t{1} << (texel_log2 - 1);
+    };
+    for (std::int64_t j = j0; j < j0 + side; ++j)
+        for (std::int64_t i = i0; i < i0 + side; ++i)
+            if (hit(i) && hit(j) && tile.presence[static_cast<std::size_t>(j * m + i)] != 0) return true;
+    return false;
+}
+
+Result<bool> TexelGround::shows(TileId id) const {
+    const TileId base_tile = ancestor_at(id, base_.deepest_level);
+    const HeightIndex::Cells cells = index_.cells(base_tile);
+    const bool refined = index_.refined(base_tile);
+    if (!refined && cells != HeightIndex::Cells::some) return cells == HeightIndex::Cells::all;
+    TileId leaf = base_tile;
+    TileRow row;
+    for (;;) {
+        auto found = read_(leaf, row);
+        if (!found) return found.error();
+        if (!*found) return false;
+        const auto marks = height_marks(row.payload);
+        if (!marks || marks->child_mask == 0 || leaf.level >= id.level) break;
+        leaf = ancestor_at(id, leaf.level + 1);
+    }
+    auto tile = decode_height_tile(row.payload, base_.tile_cells_log2, row.codec);
+    if (!tile) return tile.error();
+    if (tile->presence.empty()) return true;
+    return any_present(*tile, leaf, id);
 }
 
 }  // namespace scree

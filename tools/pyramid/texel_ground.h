@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/dataset.h"
+#include "common/height_tile.h"
 #include "common/store/tile_store.h"
 #include "tools/pyramid/height_index.h"
 #include "tools/pyramid/tint.h"
@@ -20,15 +21,19 @@ using HeightRowReader = std::function<Result<bool>(TileId id, TileRow& row)>;
 
 class TexelGround {
 public:
-    /// `dataset`: heights known. The index must outlive it.
-    TexelGround(const Dataset& dataset, const Lattice& base, const HeightIndex& index, HeightRowReader read);
+    /// For texels of one texture level. `dataset`: heights known. The index must outlive it.
+    TexelGround(const Dataset& dataset, const Lattice& base, const HeightIndex& index, HeightRowReader read,
+                int texture_level);
     ~TexelGround();
 
-    /// Texels [column, column + columns) x [row, row + rows) of the deepest texture level, RGBA, alpha >= 128 where
-    /// there is imagery: afterwards opaque where there are heights, else 0. Rows in ascending order are cheapest.
+    /// Texels [column, column + columns) x [row, row + rows) of the level, RGBA in rows of `row_bytes`, alpha >= 128
+    /// where there is imagery: afterwards opaque where there are heights, else 0. Rows in ascending order are cheapest.
     /// One call at a time; uses all threads.
     Result<void> finish(std::int64_t column, std::int64_t row, std::int64_t columns, std::int64_t rows,
-                        std::uint8_t* rgba);
+                        std::uint8_t* rgba, std::int64_t row_bytes);
+    /// Does a texel of the store's deepest level have its centre in a present cell, within a texture tile that lies
+    /// deeper than the leaf there? Any thread.
+    Result<bool> shows(TileId texture_tile) const;
 
 private:
     struct Tile;
@@ -36,6 +41,7 @@ private:
     Result<void> finish_part(Tile& tile, TileId id, const Rectangle& part, std::uint8_t* rgba, std::int64_t row_bytes);
     Result<void> load(Tile& tile, TileId id) const;
     Result<void> load_leaves(Tile& tile, TileId id) const;
+    bool any_present(const HeightTile& tile, TileId leaf, TileId id) const;
     bool leaf_present(const Tile& tile, TileId id, std::int64_t column, std::int64_t row) const;
 
     Dataset dataset_;

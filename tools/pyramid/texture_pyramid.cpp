@@ -6,6 +6,7 @@
 #include <array>
 #include <cassert>
 #include <cstring>
+#include <mutex>
 #include <tuple>
 #include <unordered_set>
 
@@ -18,6 +19,8 @@ namespace {
 
 constexpr int kRowsPerPush = 16;            // 16 rows of 64 K texels are 4 MB
 constexpr std::int64_t kChunkBlocks = 512;  // blocks of a row encoded by one task: 8 K texels, about 50 us
+
+using Runs = TextureDepth::Runs;
 
 std::int64_t round_up(std::int64_t v, std::int64_t multiple) { return (v + multiple - 1) / multiple * multiple; }
 
@@ -53,43 +56,78 @@ struct TexturePyramid::Impl {
 
     Level& level_of(int id) { return levels[static_cast<std::size_t>(job.deepest_level - id)]; }
     bool makes_tiles(const Level& level) const { return level.id >= job.root_level; }
+    bool varies(const Level& level) const { return job.depth != nullptr && makes_tiles(level); }
+
+    // Which of a level's tiles the runs are wanted of, in pixels of the rectangle; `row`: of the level, within it.
+    using Choice = Runs (TextureDepth::*)(int, std::int64_t, std::int64_t, std::int64_t) const;
+    Runs pixel_runs(const Level& level, std::int64_t row, Choice choice) const {
+        if (!varies(level)) return {{0, level.width}};
+        const int down = level.id - job.root_level;
+        const std::int64_t first = job.first_column << down;
+        Runs runs =
+            (job.depth->*choice)(level.id, (job.first_row << down) + row / size, first, first + level.width / size);
+        for (TextureDepth::Run& run : runs) run = {(run.begin - first) * size, (run.end - first) * size};
+        return runs;
+    }
 
     void encode(Level& level) {
         const std::int64_t block_columns = level.width / 4;
         const std::int64_t block_rows = level.gathered / 4;
         const std::int64_t first_row = (level.rows_done % level.band_rows) / 4;
-        const std::int64_t chunks = (block_columns + kChunkBlocks - 1) / kChunkBlocks;
-        tbb::parallel_for(std::int64_t{0}, block_rows * chunks, [&](std::int64_t task) {
-            const StageClock::Scope clock(Stage::encode);
-            const std::int64_t row = task / chunks, from = task % chunks * kChunkBlocks;
-            const std::int64_t count = std::min(kChunkBlocks, block_columns - from);
-            encode_bc1_row(level.rows.data() + (row * 4 * level.width + from * 4) * 4,
-                           static_cast<std::size_t>(level.width * 4), static_cast<std::size_t>(count),
-                           level.blocks.data() + ((first_row + row) * block_columns + from) * 8, job.quality);
-        });
+        // Refined tiles of the deepest level are made with what lies below them.
+        const bool deepest = level.id == job.deepest_level;
+        for (const auto& [begin, end] :
+             pixel_runs(level, level.rows_done, deepest ? &TextureDepth::leaf_runs : &TextureDepth::runs)) {
+            const std::int64_t first = begin / 4, blocks = (end - begin) / 4;
+            const std::int64_t chunks = (blocks + kChunkBlocks - 1) / kChunkBlocks;
+            tbb::parallel_for(std::int64_t{0}, block_rows * chunks, [&](std::int64_t task) {
+                const StageClock::Scope clock(Stage::encode);
+                const std::int64_t row = task / chunks, in_run = task % chunks * kChunkBlocks;
+                const std::int64_t from = first + in_run, count = std::min(kChunkBlocks, blocks - in_run);
+                encode_bc1_row(level.rows.data() + (row * 4 * level.width + from * 4) * 4,
+                               static_cast<std::size_t>(level.width * 4), static_cast<std::size_t>(count),
+                               level.blocks.data() + ((first_row + row) * block_columns + from) * 8, job.quality);
+            });
+        }
     }
 
     // All gathered rows of a level are encoded and halved into the next coarser one.
-    void process(std::size_t index) {
+    Result<void> process(std::size_t index) {
         Level& level = levels[index];
+        if (varies(level) && level.id < job.deepest_level) {
+            const std::int64_t row = (job.first_row << (level.id - job.root_level)) * size + level.rows_done;
+            if (auto ok = job.leaves(level.id, row, level.gathered, level.width, level.rows.data()); !ok) return ok;
+        }
         encode(level);
         if (level.id == job.root_level) keep_seeds(level);
-        level.rows_done += level.gathered;
         if (index + 1 < levels.size()) {
             Level& next = levels[index + 1];
             if (next.gathered == next.capacity) next.gathered = 0;
-            const std::int64_t pairs = level.gathered / 2;
-            std::uint8_t* out = next.rows.data() + next.gathered * next.width * 4;
-            tbb::parallel_for(std::int64_t{0}, pairs, [&](std::int64_t p) {
-                const StageClock::Scope clock(Stage::filter);
-                const std::uint8_t* upper = level.rows.data() + 2 * p * level.width * 4;
-                downsample_rgba_row(upper, upper + level.width * 4, level.width / 2, out + p * next.width * 4);
-                std::memset(out + p * next.width * 4 + level.width / 2 * 4, 0,
-                            static_cast<std::size_t>((next.width - level.width / 2) * 4));
-            });
-            next.gathered += static_cast<int>(pairs);
-            if (next.gathered == next.capacity) process(index + 1);
+            halve(level, next);
+            next.gathered += level.gathered / 2;
         }
+        level.rows_done += level.gathered;
+        if (index + 1 < levels.size() && levels[index + 1].gathered == levels[index + 1].capacity)
+            return process(index + 1);
+        return {};
+    }
+
+    void halve(const Level& level, Level& next) {
+        const std::int64_t pairs = level.gathered / 2;
+        std::uint8_t* out = next.rows.data() + next.gathered * next.width * 4;
+        const Runs runs = pixel_runs(next, level.rows_done / 2, &TextureDepth::refined_runs);
+        tbb::parallel_for(std::int64_t{0}, pairs, [&](std::int64_t p) {
+            const StageClock::Scope clock(Stage::filter);
+            const std::uint8_t* upper = level.rows.data() + 2 * p * level.width * 4;
+            for (const auto& [begin, end] : runs) {
+                const std::int64_t last = std::min(end, level.width / 2);
+                if (last > begin)
+                    downsample_rgba_row(upper + begin * 8, upper + (level.width + 2 * begin) * 4, last - begin,
+                                        out + (p * next.width + begin) * 4);
+            }
+            std::memset(out + p * next.width * 4 + level.width / 2 * 4, 0,
+                        static_cast<std::size_t>((next.width - level.width / 2) * 4));
+        });
     }
 
     void keep_seeds(const Level& level) {
@@ -105,6 +143,13 @@ struct TexturePyramid::Impl {
         for (int q = 0; q < 4; ++q)
             if (tiles.count(child_of(id, q)) != 0) mask = static_cast<std::uint8_t>(mask | (1 << q));
         return mask;
+    }
+
+    bool exists(TileId id) const {
+        return job.depth == nullptr || id.level == job.root_level || job.depth->refined(parent_of(id));
+    }
+    bool is_made_below(TileId id) const {
+        return job.depth != nullptr && id.level == job.deepest_level && job.depth->refined(id);
     }
 
     // `x`, `y`: within the rectangle.
@@ -168,22 +213,33 @@ struct TexturePyramid::Impl {
         const int down = level.id - job.root_level;
         const TileId corner{level.id, job.first_column << down, (job.first_row << down) + y};
         std::vector<std::vector<std::uint8_t>> payloads(static_cast<std::size_t>(columns));
+        std::mutex mutex;
+        Result<void> outcome;
         tbb::parallel_for(std::int64_t{0}, columns, [&](std::int64_t x) {
             const TileId id{level.id, corner.x + x, corner.y};
             const bool may_show = level.id > job.shared_levels, stored = job.stored(id);
+            if ((!stored && !may_show) || !exists(id) || is_made_below(id)) return;
             const std::uint8_t children = child_mask(id);
-            if (!stored && !may_show) return;
+            const bool above_deepest = job.depth != nullptr && level.id < job.depth->deepest();
             const StageClock::Scope clock(Stage::encode);
+            if (!stored && children == 0 && above_deepest) {
+                const auto shows = job.shows(id);
+                const std::lock_guard lock(mutex);
+                if (!shows) outcome = shows.error();
+                if (!shows || !*shows) return;
+            }
             TextureTile tile = assemble(level.id, x, y);
-            if (!stored && children == 0 && !any_opaque(tile, job.texture_size_log2)) return;
+            if (!stored && children == 0 && !above_deepest && !any_opaque(tile, job.texture_size_log2)) return;
             tile.child_mask = children;
             payloads[static_cast<std::size_t>(x)] =
                 encode_texture_tile(tile, job.texture_size_log2, TextureCodec::split);
         });
+        if (!outcome) return outcome;
         for (std::int64_t x = 0; x < columns; ++x) {
             auto& payload = payloads[static_cast<std::size_t>(x)];
-            if (payload.empty()) continue;
             const TileId id{level.id, corner.x + x, corner.y};
+            if (is_made_below(id) && job.made_below(id)) tiles.insert(id);
+            if (payload.empty()) continue;
             tiles.insert(id);
             if (auto ok = job.sink(id, std::move(payload)); !ok) return ok;
         }
@@ -236,7 +292,7 @@ Result<void> TexturePyramid::push(int buffer) {
         impl_->buffer = buffer;
     }
     front.gathered = front.capacity;
-    impl_->process(0);
+    if (auto ok = impl_->process(0); !ok) return ok;
     return impl_->emit(0);
 }
 
@@ -249,7 +305,7 @@ Result<std::int64_t> TexturePyramid::finish() {
             std::memset(level.rows.data() + level.gathered * level.width * 4, 0,
                         static_cast<std::size_t>((level.capacity - level.gathered) * level.width * 4));
             level.gathered = level.capacity;
-            impl_->process(index);
+            if (auto ok = impl_->process(index); !ok) return ok.error();
             if (auto ok = impl_->emit(index); !ok) return ok.error();
         }
     }

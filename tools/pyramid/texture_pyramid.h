@@ -12,6 +12,7 @@
 
 #include "common/dataset.h"
 #include "tools/pyramid/bc1_encoder.h"
+#include "tools/pyramid/texture_depth.h"
 
 namespace scree {
 
@@ -32,6 +33,19 @@ struct TexturePyramidJob {
     int shared_levels = 0;
     /// Which children of a tile of deepest_level are stored: 0 where that is the texture's depth. Any thread.
     std::function<std::uint8_t(TileId id)> children_below;
+    /// Where the depth varies by place; all tiles above root_level are refined. Null: it ends at deepest_level.
+    const TextureDepth* depth = nullptr;
+    /// Makes pixels of the tiles of a level above deepest_level that are not refined: rows [row, row + rows) of the
+    /// level, in rows of `columns` pixels from the rectangle's first column on. Others are left as they are.
+    std::function<Result<void>(int level, std::int64_t row, std::int64_t rows, std::int64_t columns,
+                               std::uint8_t* rgba)>
+        leaves;
+    /// Refined tiles of deepest_level, whose pixels are pushed, have been made with what lies below: is this one
+    /// stored?
+    std::function<bool(TileId id)> made_below;
+    /// Does a tile that is not refined, above the textures' deepest level and deeper than shared_levels, show anything
+    /// at that level? Null: there are none.
+    std::function<Result<bool>(TileId id)> shows;
     TextureSink sink;
 };
 

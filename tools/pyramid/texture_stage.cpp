@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstring>
 #include <mutex>
+#include <unordered_set>
 
 #include "common/store/seed_codec.h"
 #include "common/store/texture_codec.h"
@@ -18,20 +19,21 @@ namespace {
 
 constexpr std::int64_t kSampledColumns = 512;  // of a task
 constexpr std::int64_t kPreparedRows = 64;
+constexpr int kLeastDeepTexelsLog2 = 15;
 
 Error interrupted() { return {ErrorCode::interrupted, "stopped"}; }
 
+// Levels that a piece under one tile may span: 2^15 texels side by side.
+int deepest_step(const Dataset& d) { return std::max(1, kLeastDeepTexelsLog2 - d.texture_size_log2); }
+
 }  // namespace
 
-int seed_level(const Dataset& d) { return std::max(0, d.texture_deepest_level - kSeedLevelsUp); }
+int seed_level(const Dataset& d) { return std::max(0, d.least_texture_level() - kSeedLevelsUp); }
 
-TargetGrid texel_grid(const Dataset& d) {
-    const double texel = d.texel_m(d.texture_deepest_level);
-    return {d.lattice.origin_x_m + texel / 2, d.lattice.origin_y_m - texel / 2, texel};
+TextureStage::TextureStage(TextureStageJob job) : job_(std::move(job)), coarsest_(job_.dataset.least_texture_level()) {
+    for (int level = coarsest_; level <= job_.dataset.texture_deepest_level; ++level)
+        grounds_.push_back(std::make_unique<TexelGround>(job_.dataset, job_.base, *job_.index, job_.heights, level));
 }
-
-TextureStage::TextureStage(TextureStageJob job)
-    : job_(std::move(job)), ground_(job_.dataset, job_.base, *job_.index, job_.heights) {}
 
 std::int64_t TextureStage::district_columns() const {
     const Dataset& d = job_.dataset;
@@ -49,57 +51,205 @@ std::int64_t TextureStage::bytes_needed(const Dataset& d, std::int64_t texels_wi
     return TexturePyramid::bytes_needed(texels_wide, d.texture_size_log2) + 2 * seeds + (std::int64_t{24} << 20);
 }
 
-// Makes the texel rows of a rectangle of districts, from north to south.
+std::int64_t TextureStage::least_deep_texels(const Dataset& d) {
+    const int deeper = d.texture_deepest_level - d.least_texture_level();
+    return std::int64_t{1} << (d.texture_size_log2 + std::min(deepest_step(d), deeper));
+}
+
+// A rectangle of tiles of `root_level`, down to `deepest_level`.
+struct TextureStage::Rectangle {
+    int root_level = 0, deepest_level = 0;
+    std::int64_t first_column = 0, first_row = 0, columns = 0, rows = 0;
+};
+
+// Makes the texels of a piece, from north to south: of its deepest level, and of tiles above that are not refined.
 class TextureStage::Piece {
 public:
-    Piece(TextureStage& stage, TexturePyramid::Extent extent) : stage_(stage), extent_(extent) {}
+    Piece(TextureStage& stage, const Rectangle& piece) : stage_(stage), depth_(*stage.job_.depth), piece_(piece) {
+        const int down = piece.deepest_level - piece.root_level;
+        first_tile_ = piece.first_column << down;
+        size_ = stage.job_.dataset.texture_size();
+        prepared_end_.resize(static_cast<std::size_t>(down) + 1);
+    }
 
-    Result<void> fill(std::int64_t row, std::int64_t rows, std::uint8_t* rgba) {
+    /// Of a level, rows of `columns` texels; those of tiles that there are.
+    Result<void> fill(int level, std::int64_t row, std::int64_t rows, std::int64_t columns, std::uint8_t* rgba) {
         const TextureStageJob& job = stage_.job_;
         if (job.stop != nullptr && *job.stop) return interrupted();
-        const std::int64_t bytes = extent_.columns * 4 * rows;
-        if (job.imagery == nullptr)
-            std::memset(rgba, 0, static_cast<std::size_t>(bytes));
-        else if (auto ok = sample(row, rows, rgba); !ok)
-            return ok;
-        return stage_.ground_.finish(extent_.first_column, row, extent_.columns, rows, rgba);
+        const std::int64_t first = (piece_.first_column << (level - piece_.root_level)) * size_;
+        if (level == piece_.deepest_level && level < depth_.deepest())
+            if (auto ok = copy_below(row, rows, columns, rgba); !ok) return ok;
+        const auto leaves = leaves_of(level, row, first, columns);
+        if (leaves.empty()) return {};
+        ImageStack* imagery = job.imagery == nullptr ? nullptr : job.imagery->at(level);
+        if (imagery != nullptr)
+            if (auto ok = prepare(*imagery, level, row, first, columns); !ok) return ok;
+        for (const auto& [begin, end] : leaves) {
+            const Part part{begin, row, end - begin, rows, rgba + (begin - first) * 4, columns * 4};
+            if (imagery != nullptr) {
+                if (auto ok = sample(*imagery, part); !ok) return ok;
+            } else {
+                for (std::int64_t r = 0; r < rows; ++r)
+                    std::memset(part.rgba + r * part.row_bytes, 0, static_cast<std::size_t>(part.columns * 4));
+            }
+            auto ok = stage_.ground(level).finish(part.column, row, part.columns, rows, part.rgba, part.row_bytes);
+            if (!ok) return ok;
+        }
+        return {};
+    }
+
+    /// Tiles of the deepest level that are refined: was this one stored?
+    bool stored_below(TileId id) const {
+        const std::lock_guard lock(below_mutex_);
+        return below_stored_.count(id) != 0;
     }
 
 private:
-    Result<void> sample(std::int64_t row, std::int64_t rows, std::uint8_t* rgba) {
-        const TextureStageJob& job = stage_.job_;
-        ImageStack& imagery = *job.imagery;
-        if (row >= prepared_end_) {
-            imagery.release_north_of(row);
-            const std::int64_t end = std::min(row + kPreparedRows, extent_.first_row + extent_.rows);
-            const auto go_on = [&](std::int64_t) { return job.stop == nullptr || !*job.stop; };
-            if (auto ok = imagery.prepare(extent_.first_column, row, extent_.columns, end - row, go_on); !ok) return ok;
-            prepared_end_ = end;
+    // Texels [column, column + columns) x [row, row + rows) of a level.
+    struct Part {
+        std::int64_t column, row, columns, rows;
+        std::uint8_t* rgba;
+        std::int64_t row_bytes;
+    };
+
+    TextureDepth::Runs leaves_of(int level, std::int64_t row, std::int64_t first, std::int64_t columns) const {
+        if (!depth_.varies()) return {{first, first + columns}};
+        auto runs = depth_.leaf_runs(level, row / size_, first / size_, (first + columns) / size_);
+        for (TextureDepth::Run& run : runs) run = {run.begin * size_, run.end * size_};
+        return runs;
+    }
+
+    // Rows are made ready before they are sampled, more of them at a time.
+    Result<void> prepare(ImageStack& imagery, int level, std::int64_t row, std::int64_t first, std::int64_t columns) {
+        std::int64_t& prepared_end = prepared_end_[static_cast<std::size_t>(level - piece_.root_level)];
+        if (row < prepared_end) return {};
+        imagery.release_north_of(row);
+        const std::int64_t piece_end = (piece_.first_row + piece_.rows) << (level - piece_.root_level);
+        const std::int64_t end = std::min(row + kPreparedRows, piece_end * size_);
+        const std::atomic<bool>* stop = stage_.job_.stop;
+        const auto go_on = [&](std::int64_t) { return stop == nullptr || !*stop; };
+        for (std::int64_t top = row; top < end;) {
+            // Tiles of a row have the same leaves throughout; where the depth does not vary, all rows have.
+            const std::int64_t bottom = depth_.varies() ? std::min((top / size_ + 1) * size_, end) : end;
+            for (const auto& [begin, last] : leaves_of(level, top, first, columns))
+                if (auto ok = imagery.prepare(begin, top, last - begin, bottom - top, go_on); !ok) return ok;
+            top = bottom;
         }
+        prepared_end = end;
+        return {};
+    }
+
+    Result<void> sample(const ImageStack& imagery, const Part& part) {
         std::mutex mutex;
         Result<void> outcome;
-        const std::int64_t parts = (extent_.columns + kSampledColumns - 1) / kSampledColumns;
-        tbb::parallel_for(std::int64_t{0}, parts, [&](std::int64_t part) {
+        const std::int64_t parts = (part.columns + kSampledColumns - 1) / kSampledColumns;
+        tbb::parallel_for(std::int64_t{0}, parts, [&](std::int64_t k) {
             const StageClock::Scope clock(Stage::warp);
-            const std::int64_t first = part * kSampledColumns,
-                               count = std::min(kSampledColumns, extent_.columns - first);
+            const std::int64_t first = k * kSampledColumns, count = std::min(kSampledColumns, part.columns - first);
             thread_local std::vector<std::uint32_t> values;
-            values.resize(static_cast<std::size_t>(count * rows));
-            if (auto ok = imagery.sample(extent_.first_column + first, row, count, rows, values); !ok) {
+            values.resize(static_cast<std::size_t>(count * part.rows));
+            if (auto ok = imagery.sample(part.column + first, part.row, count, part.rows, values); !ok) {
                 const std::lock_guard lock(mutex);
                 if (outcome) outcome = ok;
                 return;
             }
-            for (std::int64_t r = 0; r < rows; ++r)
-                std::memcpy(rgba + (r * extent_.columns + first) * 4, values.data() + r * count,
+            for (std::int64_t r = 0; r < part.rows; ++r)
+                std::memcpy(part.rgba + r * part.row_bytes + first * 4, values.data() + r * count,
                             static_cast<std::size_t>(count * 4));
         });
         return outcome;
     }
 
+    // --- tiles of the deepest level that are refined ---
+
+    Result<void> copy_below(std::int64_t row, std::int64_t rows, std::int64_t columns, std::uint8_t* rgba) {
+        const std::int64_t y = row / size_;
+        if (y != below_row_) {
+            below_.clear();
+            below_row_ = y;
+            for (const TextureDepth::Run& run :
+                 depth_.refined_runs(piece_.deepest_level, y, first_tile_, first_tile_ + columns / size_))
+                if (auto ok = load_below(run); !ok) return ok;
+        }
+        for (const Below& tiles : below_)
+            for (std::int64_t r = 0; r < rows; ++r)
+                std::memcpy(rgba + (r * columns + (tiles.run.begin - first_tile_) * size_) * 4,
+                            tiles.rgba.data() + (row + r - y * size_) * tiles.row_bytes(size_),
+                            static_cast<std::size_t>(tiles.row_bytes(size_)));
+        return {};
+    }
+
+    // Their seeds, where they have some; nothing, where there are no heights; else they are made now.
+    Result<void> load_below(const TextureDepth::Run& run) {
+        Below& tiles = below_.emplace_back();
+        tiles.run = run;
+        tiles.rgba.assign(static_cast<std::size_t>(size_ * tiles.row_bytes(size_)), 0);
+        for (std::int64_t x = run.begin; x < run.end;) {
+            const TileId id{piece_.deepest_level, x, below_row_};
+            if (!stage_.has_heights(id)) {
+                ++x;
+            } else if (depth_.seeded(id)) {
+                if (auto ok = load_seed(tiles, id); !ok) return ok;
+                ++x;
+            } else {
+                std::int64_t end = x + 1;
+                while (end < run.end && !depth_.seeded({id.level, end, id.y}) &&
+                       stage_.has_heights({id.level, end, id.y}))
+                    ++end;
+                if (auto ok = make(tiles, {x, end}); !ok) return ok;
+                x = end;
+            }
+        }
+        return {};
+    }
+
+    struct Below {
+        TextureDepth::Run run;
+        std::vector<std::uint8_t> rgba;  // of the run's tiles, a row of tiles high
+        std::int64_t row_bytes(std::int64_t size) const { return (run.end - run.begin) * size * 4; }
+        std::uint8_t* at(std::int64_t x, std::int64_t size) { return rgba.data() + (x - run.begin) * size * 4; }
+    };
+
+    Result<void> load_seed(Below& tiles, TileId id) {
+        TileRow row;
+        auto found = stage_.read_seed(id, row);
+        if (!found) return found.error();
+        if (!*found) return {};  // it shows nothing
+        note_stored(id);
+        return decode_seed(row.payload, row.codec, static_cast<int>(size_), tiles.at(id.x, size_),
+                           static_cast<std::size_t>(tiles.row_bytes(size_)));
+    }
+
+    Result<void> make(Below& tiles, const TextureDepth::Run& run) {
+        const int level = piece_.deepest_level;
+        return stage_.build_run(
+            level, below_row_, run,
+            [&](const TexturePyramid& pyramid, std::int64_t first, std::int64_t columns) -> Result<void> {
+                const TexturePyramid::Seeds& seeds = pyramid.seeds();
+                for (std::int64_t r = 0; r < size_; ++r)
+                    std::memcpy(tiles.at(first, size_) + r * tiles.row_bytes(size_),
+                                seeds.rgba.data() + r * seeds.columns * 4,
+                                static_cast<std::size_t>(columns * size_ * 4));
+                for (std::int64_t x = first; x < first + columns; ++x)
+                    if (pyramid.stored({level, x, below_row_})) note_stored({level, x, below_row_});
+                return {};
+            });
+    }
+
+    void note_stored(TileId id) {
+        const std::lock_guard lock(below_mutex_);
+        below_stored_.insert(id);
+    }
+
     TextureStage& stage_;
-    TexturePyramid::Extent extent_;
-    std::int64_t prepared_end_ = 0;
+    const TextureDepth& depth_;
+    Rectangle piece_;
+    std::int64_t first_tile_ = 0, size_ = 256;
+    std::vector<std::int64_t> prepared_end_;  // by level, from the root's on
+    std::int64_t below_row_ = -1;
+    std::vector<Below> below_;
+    mutable std::mutex below_mutex_;  // rows are made while the last are encoded
+    std::unordered_set<TileId, TileIdHash> below_stored_;
 };
 
 Result<void> TextureStage::sink(TileId id, std::vector<std::uint8_t> payload) {
@@ -107,62 +257,139 @@ Result<void> TextureStage::sink(TileId id, std::vector<std::uint8_t> payload) {
                             static_cast<int>(TextureCodec::split), std::move(payload));
 }
 
-Result<void> TextureStage::build_districts(std::int64_t first_column, std::int64_t first_row, std::int64_t columns,
-                                           std::int64_t rows) {
+// No heights at all, by what is known of the dense part.
+bool TextureStage::has_heights(TileId id) const {
+    if (id.level <= job_.base.deepest_level) return job_.index->stored(id);
+    return job_.index->stored(ancestor_at(id, job_.base.deepest_level));
+}
+
+Result<std::unique_ptr<TexturePyramid>> TextureStage::build_piece(const Rectangle& rectangle) {
     const Dataset& d = job_.dataset;
     TexturePyramidJob job;
     job.lattice = job_.base;
     job.texture_size_log2 = d.texture_size_log2;
-    job.deepest_level = d.texture_deepest_level;
-    job.root_level = seed_level(d);
-    job.first_column = first_column;
-    job.first_row = first_row;
-    job.columns = columns;
-    job.rows = rows;
+    job.deepest_level = rectangle.deepest_level;
+    job.root_level = rectangle.root_level;
+    job.first_column = rectangle.first_column;
+    job.first_row = rectangle.first_row;
+    job.columns = rectangle.columns;
+    job.rows = rectangle.rows;
     job.quality = job_.quality;
     job.stored = [&](TileId id) { return job_.index->stored(id); };
     job.shared_levels = job_.base.deepest_level;
     job.sink = [&](TileId id, std::vector<std::uint8_t> payload) { return sink(id, std::move(payload)); };
-    TexturePyramid pyramid(std::move(job));
+    Piece piece(*this, rectangle);
+    if (job_.depth->varies()) {
+        job.depth = job_.depth;
+        job.leaves = [&](int level, std::int64_t row, std::int64_t rows, std::int64_t columns, std::uint8_t* rgba) {
+            return piece.fill(level, row, rows, columns, rgba);
+        };
+        job.made_below = [&](TileId id) { return piece.stored_below(id); };
+        job.shows = [&](TileId id) { return ground(coarsest_).shows(id); };
+    }
+    auto pyramid = std::make_unique<TexturePyramid>(std::move(job));
 
-    const TexturePyramid::Extent extent = pyramid.extent();
-    const std::int64_t step = pyramid.rows_per_push(), end = extent.first_row + extent.rows;
-    Piece piece(*this, extent);
+    const TexturePyramid::Extent extent = pyramid->extent();
+    const std::int64_t step = pyramid->rows_per_push(), end = extent.first_row + extent.rows;
+    const auto fill = [&](std::int64_t row, std::uint8_t* rgba) {
+        return piece.fill(rectangle.deepest_level, row, step, extent.columns, rgba);
+    };
     // The next rows are made while the last are encoded.
     int buffer = 0;
-    if (auto ok = piece.fill(extent.first_row, step, pyramid.rows(buffer)); !ok) return ok;
+    if (auto ok = fill(extent.first_row, pyramid->rows(buffer)); !ok) return ok.error();
     for (std::int64_t row = extent.first_row; row < end; row += step, buffer = 1 - buffer) {
         Result<void> filled;
         tbb::task_group group;
-        std::uint8_t* next = pyramid.rows(1 - buffer);
-        if (row + step < end) group.run([&] { filled = piece.fill(row + step, step, next); });
-        auto pushed = pyramid.push(buffer);
+        std::uint8_t* next = pyramid->rows(1 - buffer);
+        if (row + step < end) group.run([&] { filled = fill(row + step, next); });
+        auto pushed = pyramid->push(buffer);
         group.wait();
-        if (!pushed) return pushed;
-        if (!filled) return filled;
+        if (!pushed) return pushed.error();
+        if (!filled) return filled.error();
         if (job_.on_texels) job_.on_texels(step * extent.columns);
     }
-    if (auto stored = pyramid.finish(); !stored) return stored.error();
-    return seed_level(d) > 0 ? put_seeds(pyramid, first_column, first_row) : Result<void>{};
+    if (auto stored = pyramid->finish(); !stored) return stored.error();
+    return pyramid;
 }
 
-Result<void> TextureStage::put_seeds(const TexturePyramid& pyramid, std::int64_t first_column, std::int64_t first_row) {
+// The subtrees under refined tiles side by side, as many at a time as there is memory for.
+Result<void> TextureStage::build_run(
+    int level, std::int64_t row, TextureDepth::Run run,
+    const std::function<Result<void>(const TexturePyramid& pyramid, std::int64_t first_column, std::int64_t columns)>&
+        use) {
     const Dataset& d = job_.dataset;
-    const TexturePyramid::Seeds& seeds = pyramid.seeds();
-    const std::int64_t size = d.texture_size();
-    for (std::int64_t y = 0; y < seeds.rows / size; ++y)
-        for (std::int64_t x = 0; x < seeds.columns / size; ++x) {
-            const TileId id{seed_level(d), first_column + x, first_row + y};
-            if (!pyramid.stored(id)) continue;
-            const StageClock::Scope clock(Stage::encode);
-            auto payload = encode_seed(seeds.rgba.data() + (y * size * seeds.columns + x * size) * 4,
-                                       static_cast<std::size_t>(seeds.columns * 4), static_cast<int>(size));
-            if (auto ok = job_.writer->put(TileKind::seed, *tile_key(d.lattice, id), static_cast<int>(SeedCodec::left),
-                                           std::move(payload));
-                !ok)
-                return ok;
+    for (std::int64_t x = run.begin; x < run.end;) {
+        const int local = job_.depth->deepest_under(level, row, x, run.end);
+        const int deepest = std::min(local, level + deepest_step(d));
+        const std::int64_t wide = std::int64_t{d.texture_size()} << (deepest - level);
+        const std::int64_t columns = std::min(std::max<std::int64_t>(job_.deep_texels_wide / wide, 1), run.end - x);
+        auto pyramid = build_piece({level, deepest, x, row, columns, 1});
+        if (!pyramid) return pyramid.error();
+        if (auto ok = use(**pyramid, x, columns); !ok) return ok;
+        x += columns;
+    }
+    return {};
+}
+
+std::int64_t TextureStage::deep_rows() const { return job_.depth->rows(coarsest_); }
+
+bool TextureStage::has_deep(std::int64_t row) const {
+    if (!job_.depth->varies()) return false;
+    for (const auto& [begin, end] : job_.depth->refined_runs(coarsest_, row, 0, job_.depth->columns(coarsest_)))
+        for (std::int64_t x = begin; x < end; ++x)
+            if (job_.depth->seeded({coarsest_, x, row})) return true;
+    return false;
+}
+
+Result<void> TextureStage::build_deep_row(std::int64_t row) {
+    const auto wanted = [&](std::int64_t x) {
+        const TileId id{coarsest_, x, row};
+        return job_.depth->seeded(id) && has_heights(id) && (!job_.deep_wanted || job_.deep_wanted(id));
+    };
+    for (const auto& [begin, end] : job_.depth->refined_runs(coarsest_, row, 0, job_.depth->columns(coarsest_)))
+        for (std::int64_t x = begin; x < end; ++x) {
+            const std::int64_t first = x;
+            while (x < end && wanted(x)) ++x;
+            if (x == first) continue;
+            auto ok = build_run(coarsest_, row, {first, x},
+                                [&](const TexturePyramid& pyramid, std::int64_t column, std::int64_t columns) {
+                                    Result<void> put;
+                                    for (std::int64_t c = 0; c < columns && put; ++c)
+                                        put = put_seed(pyramid, {coarsest_, column + c, row}, c, 0);
+                                    return put;
+                                });
+            if (!ok) return ok;
         }
     return {};
+}
+
+Result<void> TextureStage::build_districts(std::int64_t first_column, std::int64_t first_row, std::int64_t columns,
+                                           std::int64_t rows) {
+    const Dataset& d = job_.dataset;
+    // Seeds of deep districts are read back.
+    if (job_.depth->varies())
+        if (auto ok = job_.writer->flush(); !ok) return ok;
+    auto pyramid = build_piece({seed_level(d), coarsest_, first_column, first_row, columns, rows});
+    if (!pyramid) return pyramid.error();
+    if (seed_level(d) == 0) return {};
+    const std::int64_t size = d.texture_size();
+    const TexturePyramid::Seeds& seeds = (*pyramid)->seeds();
+    for (std::int64_t y = 0; y < seeds.rows / size; ++y)
+        for (std::int64_t x = 0; x < seeds.columns / size; ++x)
+            if (auto ok = put_seed(**pyramid, {seed_level(d), first_column + x, first_row + y}, x, y); !ok) return ok;
+    return {};
+}
+
+// `column`, `row`: in tiles of the pyramid's rectangle.
+Result<void> TextureStage::put_seed(const TexturePyramid& pyramid, TileId id, std::int64_t column, std::int64_t row) {
+    if (!pyramid.stored(id)) return {};
+    const StageClock::Scope clock(Stage::encode);
+    const TexturePyramid::Seeds& seeds = pyramid.seeds();
+    const std::int64_t size = job_.dataset.texture_size();
+    auto payload = encode_seed(seeds.rgba.data() + (row * size * seeds.columns + column * size) * 4,
+                               static_cast<std::size_t>(seeds.columns * 4), static_cast<int>(size));
+    return job_.writer->put(TileKind::seed, *tile_key(job_.dataset.lattice, id), static_cast<int>(SeedCodec::left),
+                            std::move(payload));
 }
 
 Result<bool> TextureStage::read_seed(TileId id, TileRow& row) {

@@ -20,6 +20,7 @@
 #include "common/progress.h"
 #include "tools/partial_file.h"
 #include "tools/pyramid/build_record.h"
+#include "tools/pyramid/height_pyramid.h"
 #include "tools/pyramid/height_stage.h"
 #include "tools/pyramid/texture_stage.h"
 #include "tools/source/fingerprint.h"
@@ -81,9 +82,9 @@ private:
     std::vector<fs::path> folders_;
 };
 
-// Columns and rows of texels or districts.
+// Finest cells, counted as the lattice's.
 struct Box {
-    std::int64_t west = 0, north = 0, east = 0, south = 0;  // east and south are one past
+    double west = 0, north = 0, east = 0, south = 0;
 };
 
 class Update {
@@ -180,9 +181,6 @@ private:
                 was.lattice.origin_x_m, was.lattice.origin_y_m);
         else if (was.crs != is.crs)
             what = fmt::format("the CRS would be {} instead of {}", is.crs, was.crs);
-        else if (was.texture_deepest_level != is.texture_deepest_level)
-            what = fmt::format("the textures would have {} levels instead of {}", is.texture_deepest_level + 1,
-                               was.texture_deepest_level + 1);
         else if (was.options != is.options)
             what = "its options would be others";
         if (what.empty()) return {};
@@ -200,7 +198,7 @@ private:
         writer_ = std::make_unique<TileWriter>(*side_);
         Progress progress("updating", "MPix", options_.quiet);
         const Lattice base = plan_->mosaic.base_lattice();
-        index_ = std::make_unique<HeightIndex>(base, dataset().texture_deepest_level);
+        index_ = std::make_unique<HeightIndex>(base, plan_->dataset.texture_deepest_level);
         if (auto ok = make_heights(progress); !ok) return ok;
         return make_textures(progress);
     }
@@ -223,13 +221,32 @@ private:
             dataset_.options = plan_->dataset.options;
             dataset_.attribution = plan_->dataset.attribution;
             dataset_.has_imagery = plan_->dataset.has_imagery;
-            return index_->note_all(*store_);
+            dataset_.texture_deepest_level = plan_->dataset.texture_deepest_level;
+            dataset_.coarsest_texture_level = plan_->dataset.coarsest_texture_level;
+            if (auto ok = index_->note_all(*store_); !ok) return ok;
+            return mark_texture_ends();
         }
         auto made = build_heights(*plan_, build_, *writer_, *index_, progress, stop_);
         if (!made) return made.error();
         dataset_ = std::move(made->dataset);
         report_.warnings = std::move(made->warnings);
         return writer_->flush();
+    }
+
+    // Heights that stay say where textures end all the same.
+    Result<void> mark_texture_ends() {
+        if (!dataset().coarsest_texture_level && !dataset_.coarsest_texture_level) return {};
+        Result<void> outcome;
+        std::vector<std::uint8_t> payload;
+        auto ok = store_->for_each(TileKind::height, [&](const SqliteStore::RowView& row) {
+            payload.assign(row.payload.begin(), row.payload.end());
+            say_where_textures_end(payload, *tile_from_key(dataset_.lattice, row.key), plan_->textures);
+            if (std::equal(payload.begin(), payload.end(), row.payload.begin())) return true;
+            outcome = writer_->put(TileKind::height, row.key, row.codec, payload);
+            return outcome.ok() && !stop_;
+        });
+        if (ok && stop_) return interrupted();
+        return ok ? outcome : ok;
     }
 
     Result<bool> read_heights(TileId id, TileRow& row) {
@@ -243,25 +260,22 @@ private:
         auto reader = store_->open_reader();
         if (!reader) return reader.error();
         reader_ = std::move(*reader);
-        std::unique_ptr<ImageStack> imagery;
-        const MosaicPlan& m = plan_->mosaic;
-        if (!m.imagery.empty()) {
-            auto opened = ImageStack::open(m.imagery, m.image_layers, texel_grid(dataset_), m.crs,
-                                           {build_.kernel, plan_->open, build_, build_.out});
-            if (!opened) return opened.error();
-            imagery = std::move(*opened);
-        }
+        auto imagery = LevelImagery::open(*plan_, build_);
+        if (!imagery) return imagery.error();
         TextureStageJob job;
         job.dataset = dataset_;
-        job.base = m.base_lattice();
+        job.base = plan_->mosaic.base_lattice();
         job.index = index_.get();
         job.heights = [&](TileId id, TileRow& row) { return read_heights(id, row); };
-        job.imagery = imagery.get();
+        job.depth = &plan_->textures;
+        job.imagery = &*imagery;
+        job.deep_texels_wide = plan_->deep_texels_wide;
+        job.deep_wanted = [&](TileId id) { return is_deep_dirty(id); };
         job.writer = writer_.get();
         job.quality = build_.texture_quality;
         job.other_seeds = [&](std::int64_t key, TileRow& row) -> Result<bool> {
+            if (was_made_again(TileKind::seed, key)) return false;  // it has none now
             const TileId id = *tile_from_key(dataset_.lattice, key);
-            if (dirty_.at(static_cast<std::size_t>(id.y * columns_ + id.x)) != 0) return false;  // it has none now
             const std::lock_guard lock(reading_);
             return reader_->read(TileKind::seed, id, row);
         };
@@ -271,6 +285,10 @@ private:
         rows_ = stage.district_rows();
         if (auto ok = find_dirty(); !ok) return ok;
         progress.set_total(static_cast<double>(report_.districts_built));
+        for (std::int64_t row = 0; row < stage.deep_rows(); ++row) {
+            if (stop_) return interrupted();
+            if (auto ok = stage.build_deep_row(row); !ok) return ok;
+        }
         for (std::int64_t y = 0; y < rows_; ++y)
             for (std::int64_t x = 0; x < columns_; ++x) {
                 if (!is_dirty(x, y)) continue;
@@ -290,21 +308,29 @@ private:
         return dirty_[static_cast<std::size_t>(y * columns_ + x)] != 0;
     }
 
-    // Texels of the deepest level along a district.
-    std::int64_t district_texels() const {
-        return std::int64_t{1} << (dataset_.texture_size_log2 + dataset_.texture_deepest_level - seed_level(dataset_));
-    }
+    bool is_deep_dirty(TileId id) const { return deep_dirty_[static_cast<std::size_t>(id.y * deep_columns_ + id.x)]; }
 
-    void mark(const Box& texels) {
-        const std::int64_t side = district_texels();
-        const auto clip = [](std::int64_t v, std::int64_t count) { return std::clamp<std::int64_t>(v, 0, count); };
-        for (std::int64_t y = clip(texels.north / side, rows_); y < clip((texels.south + side - 1) / side, rows_); ++y)
-            for (std::int64_t x = clip(texels.west / side, columns_);
-                 x < clip((texels.east + side - 1) / side, columns_); ++x)
-                dirty_[static_cast<std::size_t>(y * columns_ + x)] = 1;
+    // A box of finest cells, and all tiles of the textures' coarsest level that it touches.
+    void mark(const Box& cells) {
+        const int level = dataset_.least_texture_level(), up = level - seed_level(dataset_);
+        const double side = std::ldexp(1.0, dataset_.lattice.deepest_level - level + dataset_.lattice.tile_cells_log2);
+        const auto clip = [&](double v, std::int64_t count) {
+            return static_cast<std::int64_t>(std::clamp(v, 0.0, static_cast<double>(count)));
+        };
+        const std::int64_t west = clip(std::floor(cells.west / side), deep_columns_),
+                           east = clip(std::ceil(cells.east / side), deep_columns_),
+                           south = clip(std::ceil(cells.south / side), deep_rows_);
+        for (std::int64_t y = clip(std::floor(cells.north / side), deep_rows_); y < south; ++y)
+            for (std::int64_t x = west; x < east; ++x) {
+                deep_dirty_[static_cast<std::size_t>(y * deep_columns_ + x)] = true;
+                dirty_[static_cast<std::size_t>((y >> up) * columns_ + (x >> up))] = 1;
+            }
     }
 
     Result<void> find_dirty() {
+        deep_columns_ = plan_->textures.columns(dataset_.least_texture_level());
+        deep_rows_ = plan_->textures.rows(dataset_.least_texture_level());
+        deep_dirty_.assign(static_cast<std::size_t>(deep_columns_ * deep_rows_), false);
         dirty_.assign(static_cast<std::size_t>(columns_ * rows_), 0);
         report_.districts = columns_ * rows_;
         // The tint's colours span the range of heights.
@@ -312,12 +338,17 @@ private:
             dataset_.min_height_m != dataset().min_height_m || dataset_.max_height_m != dataset().max_height_m;
         // Where depth varies the dense part, which the tint is made of, may have another depth.
         const bool depth = plan_->mosaic.base_shift > 0 || dataset().coarsest_leaf_level;
-        const bool all = heights_made_ && (range || depth);
-        if (all)
+        // Districts begin elsewhere; or which textures beyond the heights exist goes by other texels' centres.
+        all_dirty_ = (heights_made_ && (range || depth)) ||
+                     dataset_.least_texture_level() != dataset().least_texture_level() ||
+                     (depth && dataset_.texture_deepest_level != dataset().texture_deepest_level);
+        if (all_dirty_) {
             std::fill(dirty_.begin(), dirty_.end(), std::uint8_t{1});
-        else
+            std::fill(deep_dirty_.begin(), deep_dirty_.end(), true);
+        } else {
             mark_images();
-        if (heights_made_ && !all)
+        }
+        if (heights_made_ && !all_dirty_)
             if (auto ok = mark_heights(); !ok) return ok;
         report_.districts_built = std::count(dirty_.begin(), dirty_.end(), 1);
         return {};
@@ -366,30 +397,26 @@ private:
     }
 
     void mark_box(const SourceRecord& s, const std::array<double, 4>& box) {
-        const TargetGrid grid = texel_grid(dataset_);
         const auto [west, south, east, north] = box;
         const double wide = (*s.box_m)[2] - (*s.box_m)[0], high = (*s.box_m)[3] - (*s.box_m)[1];
         // What a kernel reads around a point, in pixels; and what a curved side may reach out between the points that
         // the box was made of.
         const double pixel = std::max(wide / static_cast<double>(s.width), high / static_cast<double>(s.height));
-        const double reach = 4 * std::max(pixel, grid.step_m) + 0.01 * std::max(wide, high);
-        const auto texel = [&](double metres) { return static_cast<std::int64_t>(std::floor(metres / grid.step_m)); };
-        mark({texel(west - reach - grid.x_m), texel(grid.y_m - north - reach), texel(east + reach - grid.x_m) + 1,
-              texel(grid.y_m - south + reach) + 1});
+        const double texel = dataset_.texel_m(dataset_.least_texture_level());
+        const double reach = 4 * std::max(pixel, texel) + 0.01 * std::max(wide, high);
+        const Lattice& l = dataset_.lattice;
+        mark({l.i_of(west - reach), l.j_of(north + reach), l.i_of(east + reach), l.j_of(south - reach)});
     }
 
     // Where leaves differ, presence and tint may.
     Result<void> mark_heights() {
         const Lattice& l = dataset_.lattice;
-        const double texels_a_cell = l.spacing_m / dataset_.texel_m(dataset_.texture_deepest_level);
         return for_each_changed_height([&](std::int64_t key, bool) -> Result<void> {
             const TileId id = *tile_from_key(l, key);
             if (id.level < plan_->mosaic.base_lattice().deepest_level) return {};
-            const double side = static_cast<double>(l.tile_extent(id.level)) * texels_a_cell;
-            const auto at = [&](std::int64_t tile) {
-                return static_cast<std::int64_t>(static_cast<double>(tile) * side);
-            };
-            mark({at(id.x), at(id.y), at(id.x + 1) + 1, at(id.y + 1) + 1});
+            const auto side = static_cast<double>(l.tile_extent(id.level));
+            const auto at = [&](std::int64_t tile) { return static_cast<double>(tile) * side; };
+            mark({at(id.x), at(id.y), at(id.x + 1), at(id.y + 1)});
             return {};
         });
     }
@@ -406,6 +433,7 @@ private:
             const std::lock_guard lock(reading_);
             auto found = reader_->read(TileKind::height, *tile_from_key(dataset_.lattice, key), held);
             if (!found) return found.error();
+            say_where_textures_end(held.payload, *tile_from_key(dataset_.lattice, key), plan_->textures);
             if (*found && held.codec == fresh.codec && held.payload == fresh.payload) continue;
             if (auto ok = visit(key, true); !ok) return ok;
         }
@@ -439,7 +467,6 @@ private:
 
     // Tiles that were made again: those that differ are written, those that are no more removed.
     Result<void> apply(SqliteStoreWriter& target, TileKind kind) {
-        if (kind == TileKind::height && !heights_made_) return {};
         std::vector<std::int64_t> made, gone;
         if (auto ok = side_->for_each_key(kind, [&](std::int64_t key) { made.push_back(key); }); !ok) return ok;
         if (auto ok = target.for_each_key(kind,
@@ -468,13 +495,18 @@ private:
     }
 
     bool was_made_again(TileKind kind, std::int64_t key) const {
-        if (kind == TileKind::height) return true;
+        if (kind == TileKind::height) return heights_made_;
         if (report_.districts_built == 0) return false;
+        if (all_dirty_) return true;
         const auto id = tile_from_key(dataset_.lattice, key);
-        const int seeds = seed_level(dataset_);
+        const int seeds = seed_level(dataset_), coarsest = dataset_.least_texture_level();
         if (!id || id->level < seeds) return id.has_value();
         const TileId district = ancestor_at(*id, seeds);
-        return district.x < columns_ && district.y < rows_ && is_dirty(district.x, district.y);
+        if (district.x >= columns_ || district.y >= rows_ || !is_dirty(district.x, district.y)) return false;
+        if (id->level < coarsest) return true;
+        // Deep districts that nothing touches have their seeds.
+        const TileId deep = ancestor_at(*id, coarsest);
+        return !plan_->textures.seeded(deep) || is_deep_dirty(deep);
     }
 
     const UpdateOptions& options_;
@@ -494,6 +526,9 @@ private:
     bool heights_made_ = false;
     std::int64_t columns_ = 0, rows_ = 0;  // of districts
     std::vector<std::uint8_t> dirty_;
+    std::int64_t deep_columns_ = 0, deep_rows_ = 0;  // tiles of the textures' coarsest level
+    std::vector<bool> deep_dirty_;                   // of them; those of deep districts matter
+    bool all_dirty_ = false;
 };
 
 }  // namespace

@@ -1,6 +1,5 @@
 #include "tools/source/grid_file.h"
 
-#include <array>
 #include <cctype>
 #include <cmath>
 #include <filesystem>
@@ -11,75 +10,16 @@
 #include "tools/source/number_text.h"
 #include "tools/source/pam_file.h"
 #include "tools/source/projection_file.h"
+#include "tools/source/raster_formats.h"
 
 namespace scree {
 namespace {
 
-constexpr std::size_t kSniffBytes = 1024;
 constexpr std::string_view kSpace(" \t\r\n\f\v\0", 7);
 
-std::optional<std::string> header_beside(const std::string& path) {
-    for (const char* extension : {".hdr", ".HDR", ".Hdr"}) {
-        std::error_code ignored;
-        const std::string replaced = std::filesystem::path(path).replace_extension(extension).string();
-        if (replaced != path && std::filesystem::is_regular_file(replaced, ignored)) return replaced;
-        if (std::filesystem::is_regular_file(path + extension, ignored)) return path + extension;
-    }
-    return std::nullopt;
-}
-
-enum class Kind { none, hgt, ascii_grid, raw, dted, usgs_dem };
-
-struct Found {
-    Kind kind = Kind::none;
-    std::string header_path;  ///< raw only
-};
-
-bool begins_as_tiff_or_erdas(std::string_view start) {
-    return start.starts_with("II*") || start.starts_with("MM") || start.starts_with("II+") ||
-           start.starts_with("EHFA_HEADER_TAG");
-}
-
-Result<Found> kind_of(const std::string& path, std::string_view start) {
-    const std::string extension = lower_case(std::filesystem::path(path).extension().string());
-    const auto is_one_of = [&](std::initializer_list<const char*> names) {
-        for (const char* name : names)
-            if (extension == name) return true;
-        return false;
-    };
-    if (looks_like_dted(start) || is_one_of({".dt0", ".dt1", ".dt2"})) return Found{Kind::dted, {}};
-    if (is_one_of({".hgt"})) return Found{Kind::hgt, {}};
-    if (looks_like_ascii_grid(start) && !is_one_of({".hdr"})) return Found{Kind::ascii_grid, {}};
-    if (is_one_of({".asc"})) return Found{Kind::ascii_grid, {}};
-    const std::optional<std::string> header = header_beside(path);
-    if (is_one_of({".bil", ".bip", ".bsq", ".flt"})) {
-        if (header) return Found{Kind::raw, *header};
-        return unusable_grid(path,
-                             "a raw grid needs its header, the file of the same name that ends in .hdr; there is "
-                             "none beside it");
-    }
-    if (header && is_one_of({".dem", ".img", ".raw", ".dat", ".bin", ""}) && !begins_as_tiff_or_erdas(start))
-        return Found{Kind::raw, *header};
-    if (is_one_of({".dem"}) || looks_like_usgs_dem(start)) return Found{Kind::usgs_dem, {}};
-    const bool radiance = start.starts_with("#?");
-    if (is_one_of({".hdr"}) && !radiance)
-        return unusable_grid(path, "this is the header of a raster; name the raster that lies beside it");
-    return Found{};
-}
-
-Result<GridFile> open_found(ByteFile file, const Found& found) {
-    switch (found.kind) {
-        case Kind::hgt:
-            return open_hgt(std::move(file));
-        case Kind::ascii_grid:
-            return open_ascii_grid(std::move(file));
-        case Kind::raw:
-            return open_raw_grid(std::move(file), found.header_path);
-        case Kind::dted:
-            return open_dted(std::move(file));
-        default:
-            return open_usgs_dem(std::move(file));
-    }
+// What a user named that is no raster but the text beside one. Radiance images are called so, too.
+bool is_header_of_a_raster(const std::string& path, std::string_view start) {
+    return lower_case(std::filesystem::path(path).extension().string()) == ".hdr" && !start.starts_with("#?");
 }
 
 // What the header leaves open, an .aux.xml, a world file and a projection file beside it may say.
@@ -108,10 +48,11 @@ Result<std::optional<GridFile>> open_grid_file(const std::string& path) {
     if (!file) return file.error();
     const Result<std::string> start = file->head(kSniffBytes);
     if (!start) return start.error();
-    const Result<Found> found = kind_of(path, *start);
-    if (!found) return found.error();
-    if (found->kind == Kind::none) return std::optional<GridFile>{};
-    Result<GridFile> grid = open_found(std::move(*file), *found);
+    if (is_header_of_a_raster(path, *start))
+        return unusable_grid(path, "this is the header of a raster; name the raster that lies beside it");
+    const GridFormat* format = grid_format_of(path, *start);
+    if (format == nullptr) return std::optional<GridFile>{};
+    Result<GridFile> grid = format->open(std::move(*file));
     if (!grid) return grid.error();
     if (auto asked = ask_sidecars(path, *grid); !asked) return asked.error();
     return std::optional<GridFile>(std::move(*grid));

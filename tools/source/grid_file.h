@@ -1,6 +1,6 @@
-// The DEM formats that are read by our own code rather than by an image library: SRTM .hgt, DTED, ESRI ASCII grids, raw
-// grids with a text header (BIL, BIP, BSQ, GridFloat, ENVI) and USGS ASCII DEMs. Every reader checks what a header
-// claims against the size of the file before anything is allocated. One thread at a time.
+// The DEM formats that are read by our own code rather than by an image library, in the program itself;
+// raster_formats.h lists them. Every reader checks what a header claims against the size of the file before anything is
+// allocated. One thread at a time.
 #pragma once
 
 #include <cstdint>
@@ -23,8 +23,7 @@ struct GridFile {
     std::optional<Georeference> georeference;
 };
 
-/// nullopt for a file of none of these kinds. A kind is known by content where the format has a signature (DTED, ASCII
-/// grid), else by extension (.hgt, .bil .bip .bsq .flt; .dem, .img, .raw, .dat, .bin and none with a .hdr beside).
+/// nullopt for a file of none of these kinds.
 /// Errors: ErrorCode::input, naming file, value and consequence.
 Result<std::optional<GridFile>> open_grid_file(const std::string& path);
 
@@ -40,8 +39,8 @@ Result<GridFile> open_ascii_grid(ByteFile file);
 bool looks_like_ascii_grid(std::string_view start);
 
 /// Sources: ArcGIS documentation, "BIL, BIP, and BSQ raster files", "Float to Raster"; ENVI documentation, "ENVI header
-/// files". header_path names the text header.
-Result<GridFile> open_raw_grid(ByteFile file, const std::string& header_path);
+/// files". The header is the text that stands beside the file.
+Result<GridFile> open_raw_grid(ByteFile file);
 
 /// Source: MIL-PRF-89020B, section 3.
 Result<GridFile> open_dted(ByteFile file);

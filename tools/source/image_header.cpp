@@ -19,6 +19,7 @@
 
 #include "tools/source/gdal_metadata.h"
 #include "tools/source/number_text.h"
+#include "tools/source/raster_formats.h"
 #include "tools/source/tiff_file.h"
 
 namespace scree {
@@ -28,7 +29,6 @@ constexpr std::int64_t kMaxSide = std::int64_t{1} << 30;  // the lattice has no 
 constexpr int kMaxChannels = 1024;
 constexpr std::uint32_t kGdalMetadataTag = 42112;
 constexpr std::uint32_t kGdalNodataTag = 42113;
-constexpr std::size_t kSniffBytes = 64;
 constexpr int kMaxDirectories = 256;  // of a TIFF, searched for a mask; more are pages of something else
 
 Error unusable(const std::string& path, const std::string& what) {
@@ -407,26 +407,6 @@ Result<void> read_bmp_header(const std::string& path, std::string_view start, Im
     return {};
 }
 
-std::optional<ImageKind> kind_of(std::string_view start, const std::string& path) {
-    const auto begins = [&](std::string_view magic) { return start.substr(0, magic.size()) == magic; };
-    if (looks_like_tiff(path)) return ImageKind::tiff;
-    if (begins("\x89PNG\r\n\x1a\n")) return ImageKind::png;
-    if (begins("\xFF\xD8\xFF")) return ImageKind::jpeg;
-    if (begins("\xFF\x4F\xFF\x51") || begins(std::string_view("\0\0\0\x0CjP  \r\n\x87\n", 12)))
-        return ImageKind::jpeg2000;
-    if (begins("\x76\x2f\x31\x01")) return ImageKind::openexr;
-    if (begins("BM")) return ImageKind::bmp;
-    if (begins("RIFF") && start.size() >= 12 && start.substr(8, 4) == "WEBP") return ImageKind::webp;
-    if (begins("#?RADIANCE") || begins("#?RGBE")) return ImageKind::hdr;
-    if (start.size() >= 3 && start[0] == 'P' && std::string_view("123456Ff").find(start[1]) != std::string_view::npos &&
-        std::isspace(static_cast<unsigned char>(start[2])) != 0)
-        return ImageKind::pnm;
-    std::string extension = std::filesystem::path(path).extension().string();
-    for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    if (extension == ".tga") return ImageKind::targa;  // the one format without a signature
-    return std::nullopt;
-}
-
 template <class T>
 std::optional<double> as_integer(double value) {
     // Both limits are exact or rounded up in double; the strict comparison with max + 1 keeps the cast defined.
@@ -445,31 +425,7 @@ double as_float(double value) {
 
 }  // namespace
 
-const char* reader_name(ImageKind kind) {
-    switch (kind) {
-        case ImageKind::tiff:
-            return "tiff";
-        case ImageKind::png:
-            return "png";
-        case ImageKind::jpeg:
-            return "jpeg";
-        case ImageKind::jpeg2000:
-            return "jpeg2000";
-        case ImageKind::openexr:
-            return "openexr";
-        case ImageKind::bmp:
-            return "bmp";
-        case ImageKind::pnm:
-            return "pnm";
-        case ImageKind::webp:
-            return "webp";
-        case ImageKind::targa:
-            return "targa";
-        case ImageKind::hdr:
-            return "hdr";
-    }
-    return "";
-}
+const char* reader_name(ImageKind kind) { return image_format(kind).reader; }
 
 Result<ImageHeader> read_image_header(const std::string& path) {
     std::error_code problem;
@@ -488,17 +444,14 @@ Result<ImageHeader> read_image_header(const std::string& path) {
     start.resize(static_cast<std::size_t>(file.gcount()));
     if (start.empty()) return unusable(path, "the file is empty, so there is nothing to read");
 
-    const std::optional<ImageKind> kind = kind_of(start, path);
-    if (!kind) {
-        return unusable(
-            path,
-            "not an image of a known kind (TIFF, PNG, JPEG, JPEG 2000, OpenEXR, BMP, PNM, WebP, Targa, HDR) nor a DEM "
-            "of one (SRTM .hgt, DTED, ESRI ASCII grid, BIL, BIP, BSQ, GridFloat, ENVI, USGS DEM)");
-    }
+    const ImageFormat* format = image_format_of(path, start);
+    if (format == nullptr)
+        return unusable(path, fmt::format("not an image of a known kind ({}) nor a DEM of one ({})",
+                                          image_format_names(), grid_format_names()));
     ImageHeader header;
-    header.kind = *kind;
+    header.kind = format->kind;
     Result<void> read;
-    switch (*kind) {
+    switch (format->kind) {
         case ImageKind::tiff:
             read = read_tiff_header(path, header);
             break;

@@ -10,6 +10,7 @@
 
 #include "tools/source/grid_file.h"
 #include "tools/source/number_text.h"
+#include "tools/source/raster_formats.h"
 #include "tools/source/raw_samples.h"
 
 namespace scree {
@@ -384,14 +385,19 @@ Result<RawGrid> read_envi(const ByteFile& file, const std::string& header_path, 
 
 }  // namespace
 
-Result<GridFile> open_raw_grid(ByteFile file, const std::string& header_path) {
-    const Result<std::string> text = read_text_file(header_path, kMaxHeaderBytes);
+Result<GridFile> open_raw_grid(ByteFile file) {
+    const std::optional<std::string> header = header_beside(file.path());
+    if (!header)
+        return unusable_grid(file.path(),
+                             "a raw grid needs its header, the file of the same name that ends in .hdr; there is "
+                             "none beside it");
+    const Result<std::string> text = read_text_file(*header, kMaxHeaderBytes);
     if (!text) return text.error();
     Result<RawGrid> grid =
-        trimmed(*text).starts_with("ENVI") ? read_envi(file, header_path, *text) : read_esri(file, header_path, *text);
+        trimmed(*text).starts_with("ENVI") ? read_envi(file, *header, *text) : read_esri(file, *header, *text);
     if (!grid) return grid.error();
     if (grid->place) {
-        if (auto checked = check_place(*grid->place, header_path, "it"); !checked) return checked.error();
+        if (auto checked = check_place(*grid->place, *header, "it"); !checked) return checked.error();
     }
     GridFile opened;
     opened.nodata = grid->nodata;

@@ -66,11 +66,13 @@ private:
     std::vector<std::byte> line_;
 };
 
-// Bytes up to the end of the last sample, saturated.
+// Bytes up to the end of the sample that lies farthest, saturated. Where rows go backwards that is one of the first.
 std::int64_t bytes_needed(const RawSamples& s) {
     const auto last = [](std::int64_t count, std::int64_t step) {
         std::int64_t product = 0;
-        return __builtin_mul_overflow(count - 1, step, &product) ? std::numeric_limits<std::int64_t>::max() : product;
+        return __builtin_mul_overflow(count - 1, std::max<std::int64_t>(step, 0), &product)
+                   ? std::numeric_limits<std::int64_t>::max()
+                   : product;
     };
     std::int64_t sum = static_cast<std::int64_t>(memory_bytes(s.type));
     for (const std::int64_t part :
@@ -84,7 +86,8 @@ std::int64_t bytes_needed(const RawSamples& s) {
 
 Result<std::unique_ptr<PixelDecoder>> make_raw_decoder(ByteFile file, const RawSamples& samples) {
     assert(samples.width > 0 && samples.height > 0 && samples.channels > 0 && samples.type != SampleType::f16);
-    assert(samples.first >= 0 && samples.row_bytes >= 0 && samples.pixel_bytes >= 0 && samples.channel_bytes >= 0);
+    assert(samples.first + (samples.height - 1) * std::min<std::int64_t>(samples.row_bytes, 0) >= 0);
+    assert(samples.first >= 0 && samples.pixel_bytes >= 0 && samples.channel_bytes >= 0);
     const std::int64_t needed = bytes_needed(samples);
     if (needed > file.size())
         return unusable_grid(file.path(),

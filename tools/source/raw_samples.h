@@ -1,5 +1,7 @@
-// Samples that lie in a file as they are in memory, but for the order of their bytes: at
-// first + row * row_bytes + column * pixel_bytes + channel * channel_bytes.
+// Samples that lie in a file as they are in memory, but for the order of their bytes and rows: at
+// first + row * row_bytes + column * pixel_bytes + channel * channel_bytes. Where the file begins with the southernmost
+// row, `first` is its last row and row_bytes is negative: a lattice takes over as they are only samples that are
+// north-up.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +23,8 @@ struct RawSamples {
     std::int64_t row_bytes = 0, pixel_bytes = 0, channel_bytes = 0;  ///< steps
 };
 
-/// Errors: ErrorCode::input where the file ends before its last sample.
+/// `first` and the rows before it lie behind the file's beginning. Errors: ErrorCode::input where the file ends before
+/// its last sample.
 Result<std::unique_ptr<PixelDecoder>> make_raw_decoder(ByteFile file, const RawSamples& samples);
 
 }  // namespace scree

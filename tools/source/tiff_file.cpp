@@ -62,12 +62,16 @@ std::string text_tag(TIFF* file, std::uint32_t tag) {
     return TIFFGetField(file, tag, &count, &text) == 1 && text != nullptr ? std::string(text, count) : std::string();
 }
 
+bool begins_as_tiff(std::string_view start) {
+    using namespace std::string_view_literals;
+    return start.starts_with("II*\0"sv) || start.starts_with("MM\0*"sv) || start.starts_with("II+\0"sv) ||
+           start.starts_with("MM\0+"sv);
+}
+
 bool looks_like_tiff(const std::string& path) {
     std::array<char, 4> magic{};
     std::ifstream file(path, std::ios::binary);
-    if (!file.read(magic.data(), magic.size())) return false;
-    return std::memcmp(magic.data(), "II*\0", 4) == 0 || std::memcmp(magic.data(), "MM\0*", 4) == 0 ||
-           std::memcmp(magic.data(), "II+\0", 4) == 0 || std::memcmp(magic.data(), "MM\0+", 4) == 0;
+    return file.read(magic.data(), magic.size()) && begins_as_tiff({magic.data(), magic.size()});
 }
 
 }  // namespace scree

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <string_view>
 
 struct tiff;
 
@@ -36,6 +37,7 @@ private:
 std::string text_tag(tiff* file, std::uint32_t tag);
 
 /// True when the first bytes of the file are those of a classic or big TIFF.
+bool begins_as_tiff(std::string_view start);
 bool looks_like_tiff(const std::string& path);
 
 }  // namespace scree

@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string_view>
+#include <unordered_set>
 #include <vector>
 
 #include "common/store/page_checksum_vfs.h"
@@ -197,8 +198,41 @@ Result<bool> check_layout(const std::string& path, ProblemList& problems) {
 
 namespace {
 
-// As many as textures of their level; keys of a level follow each other.
-Result<void> check_seed_count(const SqliteStore& store, int level, std::int64_t seeds, ProblemList& problems) {
+using Tiles = std::unordered_set<TileId, TileIdHash>;
+
+// The tiles of level `level` that have textures of level `below` under them; keys of a level follow each other.
+Result<void> for_each_over(const SqliteStore& store, Connection& db, int level, int below,
+                           const std::function<void(TileId id)>& visit) {
+    const Lattice& l = store.dataset().lattice;
+    const std::int64_t first = (std::int64_t{1} << (2 * below)) * l.root_rows * l.root_columns;
+    return db.query(fmt::format("SELECT key FROM texture WHERE key BETWEEN {} AND {}", first, first + (first - 1)),
+                    [&](sqlite3_stmt* row) {
+                        const auto id = tile_from_key(l, sqlite3_column_int64(row, 0));
+                        if (id) visit(ancestor_at(*id, level));
+                        return true;
+                    });
+}
+
+// Where textures go kSeedLevelsUp levels deeper than the coarsest of them there are seeds of that level, too.
+Result<void> check_deep_seeds(const SqliteStore& store, Connection& db, const Tiles& deep_seeds,
+                              ProblemList& problems) {
+    const int level = store.dataset().least_texture_level();
+    if (level + kSeedLevelsUp > store.dataset().texture_deepest_level) return {};
+    Tiles wanting;
+    auto ok = for_each_over(store, db, level, level + kSeedLevelsUp, [&](TileId id) {
+        if (deep_seeds.count(id) == 0) wanting.insert(id);
+    });
+    if (!ok) return ok;
+    for (const TileId id : wanting)
+        problems.add(
+            fmt::format("table 'seed': none for texture tile {}/{}/{}, under which there are {} levels and more",
+                        id.level, id.x, id.y, kSeedLevelsUp));
+    return {};
+}
+
+// As many of the districts' level as textures of it.
+Result<void> check_seed_count(const SqliteStore& store, int level, std::int64_t seeds, const Tiles& deep_seeds,
+                              ProblemList& problems) {
     auto db = Connection::open(store.path());
     if (!db) return db.error();
     auto tables = db->integer("SELECT count(*) FROM sqlite_master WHERE name = 'seed'");
@@ -207,26 +241,26 @@ Result<void> check_seed_count(const SqliteStore& store, int level, std::int64_t 
     const std::vector<SourceRecord>& sources = store.dataset().sources;
     const bool for_updates =
         std::any_of(sources.begin(), sources.end(), [](const SourceRecord& s) { return s.box_m.has_value(); });
-    if (*tables == 0 || (seeds == 0 && !for_updates)) return {};
-    const Lattice& l = store.dataset().lattice;
-    const std::int64_t first = (std::int64_t{1} << (2 * level)) * l.root_rows * l.root_columns;
-    auto textures =
-        db->integer(fmt::format("SELECT count(*) FROM texture WHERE key >= {} AND key < {}", first, 4 * first));
-    if (!textures) return textures.error();
-    if (*textures != seeds)
-        problems.add(fmt::format("table 'seed': {} rows for {} textures of level {}", seeds, *textures, level));
-    return {};
+    if (*tables == 0 || (seeds == 0 && deep_seeds.empty() && !for_updates)) return {};
+    if (level > 0) {
+        std::int64_t textures = 0;
+        if (auto ok = for_each_over(store, *db, level, level, [&](TileId) { ++textures; }); !ok) return ok;
+        if (textures != seeds)
+            problems.add(fmt::format("table 'seed': {} rows for {} textures of level {}", seeds, textures, level));
+    }
+    return store.dataset().coarsest_texture_level ? check_deep_seeds(store, *db, deep_seeds, problems) : Result<void>{};
 }
 
 // No tile leads to a seed, so that each is met here.
 Result<void> check_seeds(const SqliteStore& store, ProblemList& problems, const std::function<bool()>& go_on) {
     const Dataset& dataset = store.dataset();
-    const int seed_level = dataset.texture_deepest_level - kSeedLevelsUp;
+    const int coarsest = dataset.least_texture_level(), seed_level = coarsest - kSeedLevelsUp;
     const int size = dataset.texture_size();
     const auto row_bytes = static_cast<std::size_t>(size) * 4;
     std::vector<std::uint8_t> pixels(row_bytes * static_cast<std::size_t>(size));
     std::optional<std::int64_t> previous;
-    std::int64_t count = 0;
+    std::int64_t count = 0, of_districts = 0;
+    Tiles deep_seeds;
     auto ok = store.for_each(TileKind::seed, [&](const SqliteStore::RowView& row) {
         if (previous && row.key <= *previous) {
             problems.add(fmt::format("table 'seed': key {} follows key {}", row.key, *previous));
@@ -234,9 +268,14 @@ Result<void> check_seeds(const SqliteStore& store, ProblemList& problems, const 
         }
         previous = row.key;
         const auto id = tile_from_key(dataset.lattice, row.key);
+        const bool deep = id && id->level == coarsest && dataset.coarsest_texture_level;
+        if (deep)
+            deep_seeds.insert(*id);
+        else
+            ++of_districts;
         if (!id)
             problems.add(fmt::format("table 'seed': {} is no key of this lattice", row.key));
-        else if (id->level != seed_level)
+        else if (!deep && id->level != seed_level)
             problems.add(fmt::format("seed {}/{}/{} is not of the seed level {}", id->level, id->x, id->y, seed_level));
         else if (!row.checksum_ok)
             problems.add(
@@ -247,7 +286,8 @@ Result<void> check_seeds(const SqliteStore& store, ProblemList& problems, const 
     });
     auto read = sound(ok, problems);
     if (!read) return read.error();
-    return seed_level > 0 && *read && go_on() ? check_seed_count(store, seed_level, count, problems) : Result<void>{};
+    if (!*read || !go_on()) return {};
+    return check_seed_count(store, seed_level, of_districts, deep_seeds, problems);
 }
 
 }  // namespace

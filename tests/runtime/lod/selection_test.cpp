@@ -101,6 +101,60 @@ TEST(Selection, OnceCompleteDoesNotDependOnWhatElseIsResident) {
     EXPECT_GT(limited, 10);
 }
 
+/// Tiles drawn above or at an address that something is asked for.
+std::int64_t drawn_over_missing(const Selection& s) {
+    return std::count_if(s.draws[0].begin(), s.draws[0].end(), [&](const DrawItem& item) {
+        return std::any_of(s.requests.begin(), s.requests.end(), [&](const TileRequest& r) {
+            return r.id.level >= item.tile.level && ancestor_at(r.id, item.tile.level) == item.tile;
+        });
+    });
+}
+
+TEST(Selection, CountsTheTilesThatStandInForWhatIsMissing) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    int heights_alone = 0, textures_alone = 0;
+    for (int world = 0; world < 40; ++world) {
+        const auto terrain = test::random_terrain(random, 3, 1, test::depth_of_world(world));
+        Selector selector(terrain.dataset());
+        const Camera camera = test::random_camera(random, terrain);
+        test::FakeResidency residency(terrain);
+        residency.add_all();
+        const Selection full = selector.select({&camera, 1}, test::kPlenty, residency);
+        EXPECT_EQ(full.stand_ins, 0);
+        // Heights that are missing: those drawn above them.
+        test::FakeResidency low(terrain);
+        low.add_roots();
+        for (const TileId id : terrain.textures()) low.add_texture(id);
+        for (const TileId id : terrain.tiles())
+            if (id.level <= 1) low.add(id);
+        const Selection coarse = selector.select({&camera, 1}, test::kPlenty, low);
+        const bool only_heights = std::none_of(coarse.requests.begin(), coarse.requests.end(),
+                                               [](const TileRequest& r) { return r.kind == TileKind::texture; });
+        if (only_heights && !coarse.complete) {
+            ++heights_alone;
+            EXPECT_GT(coarse.stand_ins, 0);
+            EXPECT_EQ(coarse.stand_ins, drawn_over_missing(coarse));
+        }
+        // Textures that are missing: all tiles that would be drawn with finer ones.
+        test::FakeResidency blurred(terrain);
+        for (const TileId id : terrain.tiles()) blurred.add(id);
+        for (const TileId id : terrain.textures())
+            if (id.level == 0) blurred.add_texture(id);
+        const Selection coarse_textures = selector.select({&camera, 1}, test::kPlenty, blurred);
+        std::int64_t finer = 0;
+        for (const DrawItem& item : coarse_textures.draws[0])
+            finer += std::any_of(full.draws[0].begin(), full.draws[0].end(), [&](const DrawItem& other) {
+                return other.tile == item.tile && other.texture.scale > item.texture.scale;
+            });
+        if (finer > 0) ++textures_alone;
+        EXPECT_GE(coarse_textures.stand_ins, finer);
+        EXPECT_LE(coarse_textures.stand_ins, coarse_textures.nodes);
+    }
+    EXPECT_GT(heights_alone, 5);
+    EXPECT_GT(textures_alone, 5);
+}
+
 TEST(Selection, FillingItsRequestsLeadsFromTheRootsToTheFullCutWithinTheSlots) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());

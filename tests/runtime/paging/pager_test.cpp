@@ -416,6 +416,24 @@ protected:
     std::int64_t begun_ = 0;
 };
 
+TEST_F(PagerRules, SlotsQueueAndUploadsAreCounted) {
+    open(8, 4);
+    EXPECT_EQ(pager_->queue(), 0);
+    EXPECT_EQ(pager_->slots_in_use(TileKind::height), 1) << "the root";
+    EXPECT_EQ(pager_->slots_in_use(TileKind::texture), 1);
+    const std::int64_t before = pager_->counters().upload_bytes;
+    EXPECT_GT(before, 0) << "roots are handed over as well";
+    request({want(child(0), 3), want(child(1), 2)});
+    EXPECT_EQ(pager_->queue(), 2);
+    EXPECT_EQ(pager_->slots_in_use(TileKind::height), 3) << "what is being loaded has its slot";
+    EXPECT_EQ(pager_->counters().upload_bytes, before);
+    load_all();
+    EXPECT_EQ(pager_->queue(), 0);
+    const auto side = static_cast<std::int64_t>(terrain_.lattice().tile_cells()) + 1;
+    EXPECT_EQ(pager_->counters().upload_bytes - before,
+              2 * side * side * static_cast<std::int64_t>(sizeof(SlotVertex)));
+}
+
 TEST_F(PagerRules, WhatCannotBeKeptIsNotBegunAndIsCounted) {
     open(3, 4);
     request({want(child(0), 9), want(child(1), 8)});

@@ -37,7 +37,8 @@ TEST(HtmlNumbers, AreShort) {
     EXPECT_EQ(tick_number(5000), "5k");
     EXPECT_EQ(tick_number(1500000), "1.5M");
     EXPECT_EQ(tick_number(0.5), "0.5");
-    EXPECT_EQ(megabytes(268435456), "268.4");
+    EXPECT_EQ(tick_number(-0.0), "0");
+    EXPECT_EQ(page_megabytes(268435456), "268.4");
 }
 
 TEST(ShellWords, AreQuotedWhereTheyMustBe) {

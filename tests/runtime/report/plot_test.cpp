@@ -3,12 +3,15 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <limits>
 #include <sstream>
 #include <string>
 #include <vector>
+
+#include "tests/runtime/report/html_support.h"
 
 namespace scree {
 namespace {
@@ -142,6 +145,42 @@ TEST(PlotTest, EmptyAndConstantDataMakeAChart) {
     log.x.logarithmic = log.y.logarithmic = true;
     EXPECT_EQ(count(to_svg(log), "nan"), 0u);
     EXPECT_EQ(polyline_points(to_svg(chart_of({{5, 5}, {5, 5}}))).size(), 2u);
+}
+
+TEST(PlotTest, FiguresArePartsOfAPage) {
+    LineChart lines = chart_of({{0, 1}, {1, 2}, {2, 5000}});
+    lines.title = "a < b";
+    lines.series[0].name = "one & all";
+    lines.series.push_back({"two", {{0, 2}, {2, 1}}});
+    lines.levels.push_back({"tau", 1.5});
+    BarChart bars;
+    bars.title = "bars";
+    bars.groups = {"near", "far"};
+    bars.series = {{"", {1, 2}}};
+    for (const std::string& figure :
+         {to_figure(lines), to_figure(bars), to_figure(LineChart{}), to_figure(BarChart{})}) {
+        test::expect_well_formed(figure);
+        test::expect_self_contained(figure);
+        EXPECT_EQ(figure.rfind("<figure><figcaption>", 0), 0u);
+        EXPECT_EQ(count(figure, "<style"), 0u) << "the page's style is the chart's";
+    }
+    const std::string figure = to_figure(lines);
+    EXPECT_NE(figure.find("<figcaption>a &lt; b</figcaption>"), std::string::npos);
+    EXPECT_NE(figure.find("one &amp; all</li>"), std::string::npos);
+    EXPECT_TRUE(has_text(figure, "2k"));
+    EXPECT_EQ(count(to_figure(chart_of({{0, 1}, {1, 2}})), "class=\"keys\""), 0u) << "one line needs no legend";
+}
+
+TEST(PlotTest, ThinningALongSeriesLosesNoPeak) {
+    std::vector<std::pair<double, double>> points;
+    for (int k = 0; k < 100000; ++k) points.emplace_back(k, k == 70007 ? 1e6 : k == 333 ? -5 : std::sin(0.01 * k));
+    const auto few = thinned(points, 1000);
+    EXPECT_LE(few.size(), 1000u);
+    EXPECT_GT(few.size(), 500u);
+    EXPECT_TRUE(std::is_sorted(few.begin(), few.end(), [](auto a, auto b) { return a.first < b.first; }));
+    EXPECT_NE(std::find(few.begin(), few.end(), std::pair(70007.0, 1e6)), few.end());
+    EXPECT_NE(std::find(few.begin(), few.end(), std::pair(333.0, -5.0)), few.end());
+    EXPECT_EQ(thinned(points, 100000), points);
 }
 
 TEST(PlotTest, DarkReadersGetADarkSheetAndOthersAWhiteOne) {

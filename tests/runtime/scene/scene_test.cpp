@@ -199,6 +199,23 @@ TEST_F(SceneOfHills, ThePapersMetricGoesByWhatItsTilesCorrect) {
     EXPECT_LE(paper.scene->memory().resident_bytes, options.budget_bytes);
 }
 
+TEST_F(SceneOfHills, TileBytesAreThoseOfTheSlotsInUseAndAPartOfThePlan) {
+    SceneOptions options = small_options();
+    for (const LodMethod method : {LodMethod::geomip, LodMethod::rsg}) {
+        options.lod.method = method;
+        Staged staged(*stored_, options);
+        const std::int64_t roots = staged.scene->tile_bytes(TileKind::height);
+        const Camera camera = stored_->camera(200, 512);
+        ASSERT_TRUE(staged.scene->complete({&camera, 1}).ok());
+        const std::int64_t heights = staged.scene->tile_bytes(TileKind::height),
+                           textures = staged.scene->tile_bytes(TileKind::texture);
+        EXPECT_GT(heights, roots);
+        EXPECT_GE(heights,
+                  staged.scene->pager().slots_in_use(TileKind::height) * height_slot_cost(staged.scene->dataset()));
+        EXPECT_LE(heights + textures, staged.scene->memory().resident_bytes);
+    }
+}
+
 TEST_F(SceneOfHills, CullingByCornersLeavesTilesOut) {
     const Camera camera = stored_->camera(200, 512);
     SceneOptions options = small_options();

@@ -17,15 +17,17 @@ TEST(SourceList, FoldersGiveTheirRastersInByteOrderAndPassOverTheRest) {
     const TempDirectory directory;
     std::filesystem::create_directories(directory.path("dem/b/.hidden"));
     std::filesystem::create_directories(directory.path("dem/empty"));
-    for (const char* name : {"dem/b.TIF", "dem/a.tif", "dem/B.tif", "dem/b/z.hgt", "dem/b/a.img", "dem/b/a.hdr",
-                             "dem/b/lonely.img", "dem/b/.hidden/x.tif", "dem/.x.tif", "dem/a.tfw", "dem/a.tif.aux.xml",
-                             "dem/a.tif.ovr", "dem/a.prj", "dem/readme.txt", "dem/b/c.bil", "dem/b/c.hdr"})
+    for (const char* name :
+         {"dem/b.TIF", "dem/a.tif", "dem/B.tif", "dem/b/z.hgt", "dem/b/a.img", "dem/b/a.hdr", "dem/b/lonely.img",
+          "dem/b/.hidden/x.tif", "dem/.x.tif", "dem/a.tfw", "dem/a.tif.aux.xml", "dem/a.tif.ovr", "dem/a.prj",
+          "dem/readme.txt", "dem/b/c.bil", "dem/b/c.hdr", "dem/b/envi", "dem/b/envi.hdr", "dem/b/LICENSE"})
         directory.write(name, "x");
     const auto listed = list_sources({directory.path("dem")});
     ASSERT_TRUE(listed.ok()) << listed.error().message;
     EXPECT_EQ(*listed, (std::vector<std::string>{directory.path("dem/B.tif"), directory.path("dem/a.tif"),
                                                  directory.path("dem/b.TIF"), directory.path("dem/b/a.img"),
-                                                 directory.path("dem/b/c.bil"), directory.path("dem/b/z.hgt")}));
+                                                 directory.path("dem/b/c.bil"), directory.path("dem/b/envi"),
+                                                 directory.path("dem/b/z.hgt")}));
 }
 
 TEST(SourceList, FilesStandAsTypedWhateverTheyAreCalled) {

@@ -316,7 +316,7 @@ void SmallStore::write(const std::string& path) const {
     const Lattice& l = dataset.lattice;
     int row = 0;
     for (const auto& [id, tile] : heights) {
-        const auto codec = row++ % 2 == 0 ? HeightCodec::plane : HeightCodec::raw;
+        const HeightCodec codec = height_codecs()[static_cast<std::size_t>(row++) % height_codecs().size()].codec;
         ASSERT_TRUE((*writer)
                         ->put(TileKind::height, *tile_key(l, id), static_cast<int>(codec),
                               encode_height_tile(tile, l.tile_cells_log2, codec))
