@@ -56,8 +56,8 @@ forbid runtime/render 'runtime/scene/|runtime/app/' "runtime/render lies below s
 forbid runtime/scene 'runtime/app/' "runtime/scene lies below app:"
 forbid runtime/window 'runtime/app/|runtime/lod/|runtime/paging/|runtime/render/|runtime/scene/' \
     "runtime/window lies below app and beside what is drawn:"
-forbid runtime/window "$window" "of runtime/window, window_input and hud alone know the window, key_table its keys:" \
-    'runtime/window/(window_input|hud)\.|runtime/window/key_table\.cpp:[0-9]+:#include <GLFW/glfw3\.h>'
+forbid runtime/window "$window" "of runtime/window, window_input, full_screen and hud alone know the window, key_table its keys:" \
+    'runtime/window/(window_input|full_screen|hud(_panels|_profile)?)\.|runtime/window/key_table\.cpp:[0-9]+:#include <GLFW/glfw3\.h>'
 forbid runtime/scene 'runtime/render/' "of runtime/scene, scene_renderer alone knows the renderer:" \
     'runtime/scene/scene_renderer\.'
 forbid runtime/report "$window|runtime/(view|paging|lod|scene|app|window)/" \

@@ -15,6 +15,7 @@ Result<std::unique_ptr<Display>> Display::create(const Scene& scene, const Displ
     if (!context) return context.error();
     display->context_ = std::move(*context);
     display->samples_ = o.samples;
+    display->anisotropy_ = o.anisotropy;
     auto terrain = SceneRenderer::create(scene, {o.samples, o.anisotropy});
     if (!terrain) return terrain.error();
     display->terrain_ = std::move(*terrain);
@@ -26,7 +27,7 @@ Result<std::unique_ptr<Display>> Display::create(const Scene& scene, const Displ
 Result<void> Display::change_to(const Scene& scene) {
     const FrameSettings settings = terrain_->settings();
     terrain_.reset();  // never the memory of two
-    auto terrain = SceneRenderer::create(scene, {samples_});
+    auto terrain = SceneRenderer::create(scene, {samples_, anisotropy_});
     if (!terrain) return terrain.error();
     terrain_ = std::move(*terrain);
     terrain_->settings() = settings;

@@ -56,6 +56,7 @@ private:
     std::unique_ptr<RenderTarget> target_, inset_;
     std::unique_ptr<CpuArena> arena_;
     int samples_ = 0;
+    double anisotropy_ = 1;
 };
 
 }  // namespace scree

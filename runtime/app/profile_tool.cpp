@@ -10,6 +10,8 @@ namespace scree {
 namespace {
 
 constexpr Rgba kCourse{255, 210, 90, 255}, kMark{255, 120, 60, 255};
+// Of the distance from the eye, so that they look the same from anywhere.
+constexpr double kLift = 0.002, kEndHeight = 0.04, kMarkHeight = 0.12;
 
 std::string metres(double length_m) {
     return length_m < 10'000 ? fmt::format("{:.0f} m", length_m) : fmt::format("{:.1f} km", length_m / 1000);
@@ -100,24 +102,28 @@ HudModel::ProfilePanel ProfileTool::panel(double exaggeration) const {
     return {shown, words_of(summary_of(*shown, 1))};
 }
 
-std::vector<LineSegment> ProfileTool::course(double lift_m) const {
+std::vector<LineSegment> ProfileTool::course(const glm::dvec3& eye) const {
     std::vector<LineSegment> lines;
     const Profile& p = *profile_;
-    for (std::size_t k = 1; k < p.points.size(); ++k) {
-        const auto &a = p.points[k - 1].height_m, &b = p.points[k].height_m;
-        if (a && b) lines.push_back({{place_of(p, k - 1), *a + lift_m}, {place_of(p, k), *b + lift_m}, kCourse});
-    }
+    const auto lifted = [&](std::size_t k) {
+        const glm::dvec3 on_ground(place_of(p, k), *p.points[k].height_m);
+        return on_ground + glm::dvec3(0, 0, kLift * glm::length(on_ground - eye));
+    };
+    for (std::size_t k = 1; k < p.points.size(); ++k)
+        if (p.points[k - 1].height_m && p.points[k].height_m) lines.push_back({lifted(k - 1), lifted(k), kCourse});
     return lines;
 }
 
-std::vector<LineSegment> ProfileTool::lines(double mark_m) const {
+std::vector<LineSegment> ProfileTool::lines(const glm::dvec3& eye) const {
     std::vector<LineSegment> lines;
-    const auto mark = [&](const glm::dvec3& foot) { lines.push_back({foot, foot + glm::dvec3(0, 0, mark_m), kMark}); };
-    if (profile_) lines = course(0.02 * mark_m);
-    for (const glm::dvec3& end : ends_) lines.push_back({end, end + glm::dvec3(0, 0, 0.5 * mark_m), kCourse});
+    const auto mark = [&](const glm::dvec3& foot, double height, const Rgba& rgba) {
+        lines.push_back({foot, foot + glm::dvec3(0, 0, height * glm::length(foot - eye)), rgba});
+    };
+    if (profile_) lines = course(eye);
+    for (const glm::dvec3& end : ends_) mark(end, kEndHeight, kCourse);
     if (profile_ && pointed_at_ && *pointed_at_ < profile_->points.size()) {
         const auto& height_m = profile_->points[*pointed_at_].height_m;
-        mark({place_of(*profile_, *pointed_at_), height_m.value_or(ends_[0].z)});
+        mark({place_of(*profile_, *pointed_at_), height_m.value_or(ends_[0].z)}, kMarkHeight, kMark);
     }
     return lines;
 }

@@ -44,11 +44,12 @@ public:
     bool point_at(std::optional<std::size_t> point);
 
     HudModel::ProfilePanel panel(double exaggeration) const;
-    /// The course on a flat world, lifted off the ground a little; the mark is as high as `mark_m`.
-    std::vector<LineSegment> lines(double mark_m) const;
+    /// The course on a flat world, lifted off the ground by a little, and marks at its ends and where it is pointed at,
+    /// as high as shows from `eye`.
+    std::vector<LineSegment> lines(const glm::dvec3& eye) const;
 
 private:
-    std::vector<LineSegment> course(double lift_m) const;
+    std::vector<LineSegment> course(const glm::dvec3& eye) const;
 
     bool on_ = false;
     std::vector<glm::dvec3> ends_;

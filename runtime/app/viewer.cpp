@@ -16,8 +16,6 @@
 namespace scree {
 namespace {
 
-/// Of the window's height and width.
-constexpr double kSecondShare = 0.35;
 /// Share of a frame that may be spent on waiting for tiles that are missing.
 constexpr double kPatience = 0.08;
 /// Between looks at what the store's readers have brought, and at whether the store was updated.
@@ -149,7 +147,7 @@ void Viewer::move() {
     wishes_.seconds = elapsed_s_;
     if (replay_) {
         const auto pose = replay_->pose(now_s_);
-        if (pose) rig_.set_pose(*pose);
+        rig_.set_pose(pose ? *pose : path_.back());  // the last frame came a little before the end
         if (!pose) {
             replay_.reset();
             say("The flight is over.");
@@ -180,7 +178,10 @@ void Viewer::take_answers() {
         rig_.set_mode(RigMode::orbit, middle.point);
         change_overlay();
     }
-    if (profile_.take(ground_.last_profile())) change_picture();
+    if (profile_.take(ground_.last_profile())) {
+        profile_points_ = profile_.profile()->points.size();
+        change_picture();
+    }
     for (const PictureWriter::Done& done : writer_.take_done()) {
         say(done.outcome ? fmt::format("{} is written.", done.file.string())
                          : fmt::format("No picture: {}", done.outcome.error().message));
@@ -245,8 +246,7 @@ void Viewer::draw_lines() {
     std::vector<LineSegment> lines;
     if (show_boxes_) lines = stage_.boxes();
     if (frozen_) add_frustum(chosen_for_, 0.5 * extent_m(), kFrustum, lines);
-    const double to_middle_m = glm::length(camera_.eye - rig_.pose().look);
-    const auto course = profile_.lines(std::clamp(0.05 * to_middle_m, 5.0, 0.02 * extent_m() + 5));
+    const auto course = profile_.lines(camera_.eye);
     lines.insert(lines.end(), course.begin(), course.end());
     if (lines.empty()) return;
     lines = lowered(lines, camera_.eye, frame_.half_curvature);
@@ -324,7 +324,7 @@ nlohmann::ordered_json Viewer::report() const {
     report["recordings"] = recordings_;
     report["recorded_poses"] = recorded_poses_;
     report["replays"] = replays_;
-    report["profile_points"] = profile_.profile() == nullptr ? 0 : profile_.profile()->points.size();
+    report["profile_points"] = profile_points_;  // of the last one
     report["profiles"] = profiles_;
     report["said"] = said_;
     report["renderer"] = stage_.context().renderer();

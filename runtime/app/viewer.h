@@ -48,6 +48,7 @@ public:
 
 private:
     using Clock = std::chrono::steady_clock;
+    static constexpr double kSecondShare = 0.35;  ///< of the window's height and width
 
     Viewer(const ViewerOptions& options, Stage& stage, std::unique_ptr<LineRenderer> lines);
 
@@ -147,7 +148,7 @@ private:
     std::int64_t pictures_drawn_ = 0, overlays_drawn_ = 0;
     double seconds_ = 0, cpu_s_ = 0;
     std::vector<std::string> screenshots_, recordings_, profiles_, said_;
-    std::size_t recorded_poses_ = 0;
+    std::size_t recorded_poses_ = 0, profile_points_ = 0;
     std::int64_t replays_ = 0, focused_ = 0;
 };
 

@@ -145,6 +145,7 @@ void Viewer::take_click() {
 void Viewer::set_mode(RigMode mode) {
     awaited_middle_ = 0;
     if (rig_.mode() == mode) return rig_.set_mode(RigMode::fly);
+    if (mode == RigMode::walk && !ground_m_) say("Walking begins where there is ground under the eye.");
     if (mode != RigMode::orbit) return rig_.set_mode(mode);
     awaited_middle_ = ground_.cast(GroundProbe::Ray::middle, camera_.eye, camera_.forward, frame_.half_curvature);
 }

@@ -17,6 +17,7 @@ HudModel Viewer::hud_model() const {
     describe_place(model);
     describe_signs(model);
     model.toasts = toasts_.texts();
+    if (second_ != nullptr) model.second_share = kSecondShare;
     model.credit = stage_.dataset().attribution;
     if (profile_.on()) model.profile = profile_.panel(stage_.dataset().exaggeration);
     for (const KeyBinding& key : key_bindings())

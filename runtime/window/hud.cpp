@@ -81,6 +81,7 @@ HudAnswer Hud::draw(const HudModel& model) {
     panels_.clear();
     HudAnswer answer;
     float bottom = ImGui::GetIO().DisplaySize.y;
+    draw_second_frame(model);
     if (model.profile) {
         const DrawnPanel panel = draw_profile(*model.profile);
         panels_.push_back(panel.place);

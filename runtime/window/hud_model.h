@@ -50,6 +50,7 @@ struct HudModel {
     std::vector<std::string> signs;    ///< what is on and must not be forgotten: "recording"
     std::vector<std::string> toasts;   ///< oldest first
     std::string credit;                ///< attribution
+    double second_share = 0;           ///< of the window's width and height that the second view fills; 0: none
     std::optional<Progress> progress;  ///< of the first picture
     std::optional<ProfilePanel> profile;
     std::vector<Refusal> refused;  ///< greyed in the list of keys

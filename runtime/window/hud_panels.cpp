@@ -19,7 +19,7 @@ float margin() { return 0.75f * em(); }
 void text(const std::string& words) { ImGui::TextUnformatted(words.data(), words.data() + words.size()); }
 
 void faint_text(const std::string& words) {
-    ImGui::PushStyleColor(ImGuiCol_Text, ImGui::GetStyleColorVec4(ImGuiCol_TextDisabled));
+    ImGui::PushStyleColor(ImGuiCol_Text, {0.72f, 0.75f, 0.78f, 1});
     text(words);
     ImGui::PopStyleColor();
 }
@@ -29,7 +29,7 @@ glm::dvec4 place_of_window() {
     return {at.x, at.y, at.x + size.x, at.y + size.y};
 }
 
-constexpr float kLabel_em = 6.5f, kValue_em = 22;
+constexpr float kLabel_em = 5.5f, kValue_em = 27;
 
 void rows(const std::vector<HudModel::Row>& all) {
     for (const HudModel::Row& row : all) {
@@ -42,13 +42,15 @@ void rows(const std::vector<HudModel::Row>& all) {
 }
 
 void bars(const std::vector<HudModel::Bar>& all) {
+    ImGui::PushStyleVar(ImGuiStyleVar_FramePadding, {0, 0});  // else the bars stand lower than their words
     for (const HudModel::Bar& bar : all) {
         faint_text(bar.label);
         ImGui::SameLine(kLabel_em * em());
-        ImGui::ProgressBar(static_cast<float>(bar.share), {6 * em(), 0.9f * em()}, "");
+        ImGui::ProgressBar(static_cast<float>(bar.share), {6 * em(), em()}, "");
         ImGui::SameLine();
         text(bar.value);
     }
+    ImGui::PopStyleVar();
 }
 
 // From 0 to what is usual, so that one slow frame does not flatten all others.
@@ -74,17 +76,18 @@ const HudModel::Refusal* refusal_of(const HudModel& model, Action action) {
     return nullptr;
 }
 
-constexpr float kKey_em = 8;
+constexpr float kKey_em = 6.5f, kMostHelp_em = 32;
 
-void key_line(std::string_view name, std::string_view does, bool greyed) {
-    if (greyed) ImGui::PushStyleColor(ImGuiCol_Text, ImGui::GetStyleColorVec4(ImGuiCol_TextDisabled));
-    const float left = ImGui::GetCursorPosX();
-    ImGui::PushStyleColor(ImGuiCol_Text,
-                          greyed ? ImGui::GetStyleColorVec4(ImGuiCol_TextDisabled) : ImVec4(0.65f, 0.85f, 1, 1));
+void key_line(std::string_view name, std::string_view does, bool greyed, float width) {
+    const ImVec4 off = ImGui::GetStyleColorVec4(ImGuiCol_TextDisabled);
+    ImGui::PushStyleColor(ImGuiCol_Text, greyed ? off : ImVec4(0.65f, 0.85f, 1, 1));
     text(std::string(name));
     ImGui::PopStyleColor();
-    ImGui::SameLine(left + kKey_em * em());
-    text(std::string(does));
+    ImGui::SameLine(kKey_em * em());  // from the left of the group
+    if (greyed) ImGui::PushStyleColor(ImGuiCol_Text, off);
+    ImGui::PushTextWrapPos(ImGui::GetCursorPosX() + width - kKey_em * em());
+    ImGui::TextWrapped("%s", std::string(does).c_str());
+    ImGui::PopTextWrapPos();
     if (greyed) ImGui::PopStyleColor();
 }
 
@@ -107,13 +110,15 @@ std::vector<HelpLine> help_lines(const HudModel& model) {
     return lines;
 }
 
-void help_column(std::span<const HelpLine> lines) {
+void help_column(std::span<const HelpLine> lines, float width) {
+    ImGui::BeginGroup();
     for (const HelpLine& line : lines) {
         if (!line.heading.empty())
             text(std::string(line.heading));
         else
-            key_line(line.name, line.does, line.greyed);
+            key_line(line.name, line.does, line.greyed, width);
     }
+    ImGui::EndGroup();
 }
 
 }  // namespace
@@ -152,15 +157,23 @@ void draw_legend(const HudModel& model) {
 void draw_credit(const HudModel& model) {
     if (model.credit.empty()) return;
     const ImVec2 size = ImGui::GetIO().DisplaySize;
-    ImGui::SetNextWindowPos({size.x - margin(), size.y - margin()}, ImGuiCond_Always, {1, 1});
-    ImGui::SetNextWindowSizeConstraints({0, 0}, {size.x - 2 * margin(), size.y});
+    const float right = size.x * static_cast<float>(1 - model.second_share) - margin();
+    ImGui::SetNextWindowPos({right, size.y - margin()}, ImGuiCond_Always, {1, 1});
     ImGui::SetNextWindowBgAlpha(0.4f);
     if (ImGui::Begin("credit", nullptr, kText)) {
-        ImGui::PushTextWrapPos(size.x - 4 * margin());
+        ImGui::PushTextWrapPos(right - 3 * margin());
         ImGui::TextUnformatted(model.credit.c_str());
         ImGui::PopTextWrapPos();
     }
     ImGui::End();
+}
+
+void draw_second_frame(const HudModel& model) {
+    if (model.second_share <= 0) return;
+    const ImVec2 size = ImGui::GetIO().DisplaySize;
+    const auto left_over = static_cast<float>(1 - model.second_share);
+    ImGui::GetBackgroundDrawList()->AddRect({size.x * left_over, size.y * left_over}, {size.x + 1, size.y + 1},
+                                            IM_COL32(255, 255, 255, 200));
 }
 
 void draw_progress(const HudModel& model) {
@@ -196,16 +209,15 @@ DrawnPanel draw_help(const HudModel& model) {
         const std::vector<HelpLine> lines = help_lines(model);
         const std::span<const HelpLine> all(lines);
         const std::size_t half = (lines.size() + 1) / 2;
-        ImGui::BeginGroup();
-        help_column(all.first(half));
-        ImGui::EndGroup();
-        ImGui::SameLine(0, 2 * em());
-        ImGui::BeginGroup();
-        help_column(all.subspan(half));
-        ImGui::EndGroup();
-        if (!model.refused.empty()) {
-            ImGui::Separator();
-            faint_text(model.refused.front().why);
+        const float width = std::min((size.x - 8 * margin()) / 2, kMostHelp_em * em());
+        help_column(all.first(half), width);
+        ImGui::SameLine(0, 2 * margin());
+        help_column(all.subspan(half), width);
+        if (!model.refused.empty()) ImGui::Separator();
+        const std::string* last = nullptr;
+        for (const HudModel::Refusal& refusal : model.refused) {
+            if (last == nullptr || *last != refusal.why) faint_text(refusal.why);
+            last = &refusal.why;
         }
         panel.place = place_of_window();
     }

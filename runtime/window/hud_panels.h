@@ -13,6 +13,7 @@ namespace scree {
 void draw_status(const HudModel& model);
 void draw_legend(const HudModel& model);
 void draw_credit(const HudModel& model);
+void draw_second_frame(const HudModel& model);
 void draw_progress(const HudModel& model);
 /// Above what lies at the bottom.
 void draw_toasts(const HudModel& model, float above);

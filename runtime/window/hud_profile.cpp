@@ -44,6 +44,8 @@ struct Plot {
 };
 
 void draw_ground(ImDrawList& on, const Plot& plot, const Profile& profile) {
+    const ImDrawListFlags smooth = on.Flags;
+    on.Flags &= ~ImDrawListFlags_AntiAliasedFill;  // neighbours would show seams
     for (std::size_t k = 1; k < profile.points.size(); ++k) {
         const auto &a = profile.points[k - 1].height_m, &b = profile.points[k].height_m;
         if (!a || !b) continue;
@@ -51,6 +53,7 @@ void draw_ground(ImDrawList& on, const Plot& plot, const Profile& profile) {
         on.AddQuadFilled({left.x, plot.high.y}, left, right, {right.x, plot.high.y}, kGround);
         on.AddLine(left, right, kLine, 1.5f);
     }
+    on.Flags = smooth;
 }
 
 // Three lines at round heights.

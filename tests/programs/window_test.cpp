@@ -1,83 +1,14 @@
 // The window, on a display of its own.
-#include <OpenImageIO/imageio.h>
-#include <fcntl.h>
 #include <gtest/gtest.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <chrono>
-#include <csignal>
-#include <set>
-#include <thread>
 
 #include "tests/common/test_support.h"
 #include "tests/programs/reports.h"
+#include "tests/programs/virtual_display.h"
 
 namespace scree::test {
 namespace {
-
-class VirtualDisplay {
-public:
-    VirtualDisplay() {
-        int pipe_ends[2];
-        if (::pipe(pipe_ends) != 0) return;
-        child_ = ::fork();
-        if (child_ == 0) {
-            ::close(pipe_ends[0]);
-            const int nothing = ::open("/dev/null", O_RDWR);
-            ::dup2(nothing, STDOUT_FILENO);
-            ::dup2(nothing, STDERR_FILENO);
-            const std::string fd = std::to_string(pipe_ends[1]);
-            ::execlp("Xvfb", "Xvfb", "-displayfd", fd.c_str(), "-screen", "0", "800x600x24", "-nolisten", "tcp",
-                     nullptr);
-            ::_exit(127);
-        }
-        ::close(pipe_ends[1]);
-        char buffer[16] = {};
-        std::string number;
-        for (ssize_t n;
-             (n = ::read(pipe_ends[0], buffer, sizeof buffer)) > 0 && number.find('\n') == std::string::npos;)
-            number.append(buffer, static_cast<std::size_t>(n));
-        ::close(pipe_ends[0]);
-        if (const std::size_t end = number.find('\n'); end != std::string::npos && end > 0)
-            name_ = ":" + number.substr(0, end);
-    }
-    ~VirtualDisplay() {
-        if (child_ <= 0) return;
-        ::kill(child_, SIGTERM);
-        ::waitpid(child_, nullptr, 0);
-    }
-    VirtualDisplay(const VirtualDisplay&) = delete;
-    VirtualDisplay& operator=(const VirtualDisplay&) = delete;
-    const std::string& name() const { return name_; }
-
-private:
-    pid_t child_ = -1;
-    std::string name_;
-};
-
-struct Screenshot {
-    std::vector<std::uint8_t> rgb;
-    std::size_t colours = 0;
-};
-
-Screenshot screenshot(const ProgramOptions& display, const std::string& file) {
-    Screenshot shot;
-    if (run_program("import", {"-silent", "-window", "root", file}, display).exit_code != 0) return shot;
-    const auto in = OIIO::ImageInput::open(file);
-    if (!in) return shot;
-    const auto pixels = static_cast<std::size_t>(in->spec().width) * static_cast<std::size_t>(in->spec().height);
-    std::vector<std::uint8_t> all(pixels * static_cast<std::size_t>(in->spec().nchannels));
-    if (!in->read_image(0, 0, 0, in->spec().nchannels, OIIO::TypeDesc::UINT8, all.data())) return shot;
-    std::set<std::uint32_t> colours;
-    for (std::size_t k = 0; k < pixels; ++k) {
-        const std::uint8_t* p = &all[k * static_cast<std::size_t>(in->spec().nchannels)];
-        shot.rgb.insert(shot.rgb.end(), p, p + 3);
-        colours.insert(std::uint32_t{p[0]} << 16 | std::uint32_t{p[1]} << 8 | p[2]);
-    }
-    shot.colours = colours.size();
-    return shot;
-}
 
 class Window : public ::testing::Test {
 protected:
@@ -101,7 +32,7 @@ protected:
 };
 
 TEST_F(Window, ShowsTheTerrainMovesAndCloses) {
-    Screenshot first, second;
+    Picture first, second;
     int step = 0;
     const auto start = std::chrono::steady_clock::now();
     ProgramOptions options = options_;
@@ -113,7 +44,7 @@ TEST_F(Window, ShowsTheTerrainMovesAndCloses) {
             ++step;
         } else if (step == 1 && seconds > 3.5) {
             key("keyup", "w");
-            for (const char* name : {"f", "f", "l", "l", "h", "h", "bracketleft", "bracketright", "Home"})
+            for (const char* name : {"f", "f", "1", "1", "h", "h", "bracketleft", "bracketright", "Home"})
                 key("key", name);
             key("keydown", "d");
             ++step;
@@ -134,7 +65,7 @@ TEST_F(Window, ShowsTheTerrainMovesAndCloses) {
 }
 
 TEST_F(Window, ShowsBlocksAndDikes) {
-    Screenshot first, second;
+    Picture first, second;
     int step = 0;
     const auto start = std::chrono::steady_clock::now();
     ProgramOptions options = options_;
