@@ -140,7 +140,7 @@ void PagedStage::describe_tiles(HudModel& model) const {
     std::string tiles =
         fmt::format("{} planned, {} wanted, {} on their way", s.planned_heights.size() + s.planned_textures.size(),
                     s.requests.size(), heights.loading + textures.loading);
-    if (scene_->updates() > 0) tiles += fmt::format(", update {}", scene_->updates());
+    if (facts().updates > 0) tiles += fmt::format(", update {}", facts().updates);
     model.picture.push_back({"tiles", tiles});
     const MemoryPlan& memory = scene_->memory();
     model.memory.push_back(slots_bar("heights", heights.resident, memory.height_slots, height_slot_cost(dataset())));
@@ -183,7 +183,8 @@ void PagedStage::describe_legend(HudModel& model) const {
 }
 
 StageFacts PagedStage::facts() const {
-    StageFacts facts{std::string(to_string(scene_->options().lod.method)), dataset().exaggeration, 0, 0, updates_};
+    StageFacts facts{std::string(to_string(scene_->options().lod.method)), dataset().exaggeration, 0, 0,
+                     updates_ - exaggerated_};
     if (frame_.selection == nullptr) return facts;
     facts.tau_effective_px = frame_.selection->tau_effective_px;
     facts.triangles = frame_.selection->triangles;
@@ -214,6 +215,7 @@ Result<void> PagedStage::change_to(std::unique_ptr<Scene> scene) {
     scene.reset();
     if (!changed) return changed;
     first_ = true;
+    exaggerated_ = 0;
     begin_loading();
     return scene_->start(*display_);
 }
@@ -230,6 +232,7 @@ Result<std::string> PagedStage::exaggerate(double factor) {
         if (dataset().exaggeration != before) return ok.error();
         return fmt::format("Heights stay as they are: {}", ok.error().message);
     }
+    ++exaggerated_;
     first_ = true;
     begin_loading();
     return fmt::format("Heights x {:g}", factor);

@@ -53,10 +53,11 @@ private:
     std::unique_ptr<Scene> scene_;
     std::unique_ptr<Display> display_;  // goes before the scene, whose meshes it draws
     SceneFrame frame_;
-    bool first_ = true;         ///< nothing was chosen yet
-    bool loading_ = true;       ///< the first picture is not complete yet
-    std::int64_t before_ = 0;   ///< tiles that had come when it began
-    std::int64_t updates_ = 0;  ///< of the scene, that were drawn
+    bool first_ = true;             ///< nothing was chosen yet
+    bool loading_ = true;           ///< the first picture is not complete yet
+    std::int64_t before_ = 0;       ///< tiles that had come when it began
+    std::int64_t updates_ = 0;      ///< of the scene, that were drawn
+    std::int64_t exaggerated_ = 0;  ///< of them, those that were none of the store's
 };
 
 }  // namespace scree

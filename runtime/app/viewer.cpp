@@ -139,7 +139,8 @@ Result<void> Viewer::take_input() {
     if (taken.anything) change_overlay();
     for (const Action action : taken.actions)
         if (auto ok = act(action); !ok) return ok;
-    if (taken.click_px) click(*taken.click_px);
+    for (const glm::dvec2& at_px : taken.clicks_px) clicks_.push_back(ray_through(camera_, at_px));
+    ask_click();
     return {};
 }
 

@@ -73,7 +73,7 @@ private:
     Result<void> act_on_stage(Action action);
     void act_on_view(Action action);
     void act_on_files(Action action);
-    void click(const glm::dvec2& at_px);
+    void ask_click();
     void take_click();
     void set_mode(RigMode mode);
     void go_home();
@@ -132,6 +132,7 @@ private:
     std::optional<glm::dvec2> cursor_px_;
     std::optional<double> ground_m_;  ///< under the eye, as drawn
     GroundProbe::Hit cursor_hit_;
+    std::vector<glm::dvec3> clicks_;                        ///< rays that are not asked for yet, oldest first
     std::uint64_t awaited_click_ = 0, awaited_middle_ = 0;  ///< questions; 0: none
     std::shared_ptr<const TileStore> asked_store_;
     bool picture_due_ = true;

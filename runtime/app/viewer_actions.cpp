@@ -121,9 +121,11 @@ void Viewer::close_topmost() {
         quit_ = true;
 }
 
-void Viewer::click(const glm::dvec2& at_px) {
-    awaited_click_ =
-        ground_.cast(GroundProbe::Ray::click, camera_.eye, ray_through(camera_, at_px), frame_.half_curvature);
+// One after the other: the probe keeps one question of a kind, and a profile needs both of its ends.
+void Viewer::ask_click() {
+    if (awaited_click_ != 0 || clicks_.empty()) return;
+    awaited_click_ = ground_.cast(GroundProbe::Ray::click, camera_.eye, clicks_.front(), frame_.half_curvature);
+    clicks_.erase(clicks_.begin());
 }
 
 void Viewer::take_click() {

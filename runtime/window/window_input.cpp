@@ -80,8 +80,9 @@ void WindowInput::press_button(int button) {
 void WindowInput::release_button(int button) {
     if (button == GLFW_MOUSE_BUTTON_RIGHT) right_.reset();
     if (button != GLFW_MOUSE_BUTTON_LEFT || !left_) return;
-    if (left_->travelled_px <= kClickTravel_px && glfwGetTime() - left_->when_s < kClick_s)
-        taken_.click_px = to_framebuffer(left_->at);
+    // Events come when they are polled: within a slow frame nobody can tell how long a press was.
+    const bool was_short = glfwGetTime() - left_->when_s < kClick_s || left_->takings <= 1;
+    if (left_->travelled_px <= kClickTravel_px && was_short) taken_.clicks_px.push_back(to_framebuffer(left_->at));
     left_.reset();
 }
 
@@ -123,9 +124,10 @@ glm::dvec2 WindowInput::to_framebuffer(const glm::dvec2& at) const {
 }
 
 TakenInput WindowInput::take() {
-    if (taken_.click_px) dragged_ = {};  // the few pixels of a click
+    if (!taken_.clicks_px.empty()) dragged_ = {};  // the few pixels of a click
     TakenInput taken = std::exchange(taken_, {});
     taken.rig = take_rig();
+    if (left_) ++left_->takings;
     if (inside_ && !left_ && !right_ && !others_want(cursor_)) taken.cursor_px = to_framebuffer(cursor_);
     return taken;
 }

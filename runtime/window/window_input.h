@@ -21,7 +21,7 @@ namespace scree {
 struct TakenInput {
     std::vector<Action> actions;          ///< in the order of their keys
     RigInput rig;                         ///< but for the seconds
-    std::optional<glm::dvec2> click_px;   ///< of the left button, which went up where it had gone down
+    std::vector<glm::dvec2> clicks_px;    ///< of the left button, which went up where it had gone down
     std::optional<glm::dvec2> cursor_px;  ///< none: beyond the window, or over what takes the mouse for itself
     bool anything = false;                ///< an event of any kind came: also a mouse that only moves
     bool uncovered = false;               ///< the window's contents are lost
@@ -43,6 +43,7 @@ private:
         glm::dvec2 at{0};
         double when_s = 0;
         double travelled_px = 0;  ///< furthest from where it began
+        int takings = 0;          ///< since it began
     };
 
     static WindowInput& of(GLFWwindow* window);
