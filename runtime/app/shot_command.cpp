@@ -9,7 +9,9 @@
 #include "runtime/app/commands.h"
 #include "runtime/app/display.h"
 #include "runtime/app/drawn_mesh.h"
+#include "runtime/app/stage_lines.h"
 #include "runtime/app/view_options.h"
+#include "runtime/render/line_renderer.h"
 #include "runtime/render/png.h"
 
 namespace scree {
@@ -26,12 +28,52 @@ std::optional<glm::dvec3> parse_point(const std::string& text) {
     return p;
 }
 
-Result<void> shoot(const ViewOptions& o, const std::optional<FlightPose>& asked, const std::string& out,
-                   const std::string& mesh_file, const FrameSettings& debug) {
+// Leaves `pose` alone where neither is given.
+Result<void> parse_pose(const std::string& eye, const std::string& look, const std::string& options,
+                        std::optional<FlightPose>& pose) {
+    if (eye.empty()) return {};
+    const auto e = parse_point(eye), l = parse_point(look);
+    if (!e || !l) return Error{ErrorCode::usage, fmt::format("{} both take X,Y,Z", options)};
+    pose = FlightPose{*e, *l};
+    return {};
+}
+
+struct ShotOptions {
+    std::optional<FlightPose> pose;      ///< none: an overview
+    std::optional<FlightPose> onlooker;  ///< who looks at what is drawn for that pose
+    std::string out;                     ///< PNG
+    std::string mesh_file;               ///< PLY; empty: none
+    FrameSettings debug;
+};
+
+/// Of the longer side: how far the frustum that an onlooker sees is drawn.
+constexpr double kFrustumShare = 0.5;
+constexpr Rgba kFrustum{255, 214, 90, 255};
+constexpr double kLine_px = 2, kHiddenShare = 0.35;
+
+// What was selected for one camera, from where another stands, with the frustum of the first.
+Result<void> draw_for_onlooker(const ViewOptions& o, const FlightPose& onlooker, const Camera& camera,
+                               const SceneFrame& frame, const Dataset& dataset, Display& display) {
+    auto from = camera_of(onlooker, o);
+    if (!from) return from.error();
+    auto lines = LineRenderer::create();
+    if (!lines) return lines.error();
+    display.draw(*from, frame.selection->to_render(0), frame.half_curvature);
+    const Lattice& l = dataset.lattice;
+    std::vector<LineSegment> edges;
+    add_frustum(camera, kFrustumShare * static_cast<double>(std::max(l.cells_x, l.cells_y)) * l.spacing_m, kFrustum,
+                edges);
+    (*lines)->draw(*from, lowered(edges, from->eye, frame.half_curvature), kLine_px, kHiddenShare, display.target());
+    return {};
+}
+
+Result<void> shoot(const ViewOptions& o, const ShotOptions& shot) {
+    const auto& [asked, onlooker, out, mesh_file, debug] = shot;
     auto store = open_store(o);
     if (!store) return store.error();
     if (wants_blocks(o)) {
         if (auto ok = refuse_with_blocks(debug.highlight != Highlight::none, "--colour"); !ok) return ok;
+        if (auto ok = refuse_with_blocks(onlooker.has_value(), "--seen-from"); !ok) return ok;
         return shoot_blocks(o, **store, {asked, out, mesh_file, debug});
     }
     SceneOptions options = scene_options(o);
@@ -55,7 +97,11 @@ Result<void> shoot(const ViewOptions& o, const std::optional<FlightPose>& asked,
     auto frame = (*scene)->complete({&*camera, 1}, [] { return interrupt_flag().load(); });
     if (!frame) return frame.error();
     const Selection& selection = *frame->selection;
-    (*display)->draw(*camera, selection.to_render(0), frame->half_curvature);
+    if (!onlooker) {
+        (*display)->draw(*camera, selection.to_render(0), frame->half_curvature);
+    } else if (auto ok = draw_for_onlooker(o, *onlooker, *camera, *frame, (*scene)->dataset(), **display); !ok) {
+        return ok;
+    }
     const auto pixels = (*display)->target().read_pixels();
     if (auto ok = write_png(out, o.width_px, o.height_px, pixels); !ok) return ok;
     if (!mesh_file.empty()) {
@@ -85,14 +131,19 @@ Result<void> shoot(const ViewOptions& o, const std::optional<FlightPose>& asked,
 int run_shot(int argc, char** argv) {
     CLI::App app{"Draws one picture, complete, without a window.", "scree-view shot"};
     ViewOptions o;
-    std::string out, mesh, eye, look, colour;
-    FrameSettings debug;
+    ShotOptions shot;
+    std::string eye, look, from, from_look, colour;
+    FrameSettings& debug = shot.debug;
     add_view_options(app, o);
-    app.add_option("-o,--output", out, "The PNG to write")->required()->type_name("FILE");
+    app.add_option("-o,--output", shot.out, "The PNG to write")->required()->type_name("FILE");
     auto* eye_option =
         app.add_option("--eye", eye, "X,Y,Z of the camera, metres in the dataset's CRS; default: an overview");
     app.add_option("--look", look, "X,Y,Z that it looks at")->needs(eye_option);
-    app.add_option("--mesh", mesh, "Also write the drawn triangles as a binary PLY in the dataset's coordinates")
+    auto* from_option =
+        app.add_option("--seen-from", from, "X,Y,Z of an onlooker: what is drawn for --eye, seen from there");
+    app.add_option("--seen-look", from_look, "X,Y,Z that the onlooker looks at")->needs(from_option);
+    app.add_option("--mesh", shot.mesh_file,
+                   "Also write the drawn triangles as a binary PLY in the dataset's coordinates")
         ->type_name("FILE");
     app.add_flag("--wireframe", debug.wireframe, "Draw edges only");
     app.add_option("--colour", colour,
@@ -103,14 +154,12 @@ int run_shot(int argc, char** argv) {
     if (const int code = parse_arguments(app, argc, argv); code >= 0) return code;
     if (auto ok = check_view_options(o); !ok) return report_error("scree-view shot", ok.error());
     debug.highlight = highlight_from(colour).value_or(Highlight::none);
-    std::optional<FlightPose> pose;
-    if (!eye.empty()) {
-        const auto e = parse_point(eye), l = parse_point(look);
-        if (!e || !l) return report_error("scree-view shot", {ErrorCode::usage, "--eye and --look both take X,Y,Z"});
-        pose = FlightPose{*e, *l};
-    }
+    if (auto ok = parse_pose(eye, look, "--eye and --look", shot.pose); !ok)
+        return report_error("scree-view shot", ok.error());
+    if (auto ok = parse_pose(from, from_look, "--seen-from and --seen-look", shot.onlooker); !ok)
+        return report_error("scree-view shot", ok.error());
     install_interrupt_handler();
-    if (auto ok = shoot(o, pose, out, mesh, debug); !ok) return report_error("scree-view shot", ok.error());
+    if (auto ok = shoot(o, shot); !ok) return report_error("scree-view shot", ok.error());
     return 0;
 }
 

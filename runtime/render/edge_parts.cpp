@@ -11,7 +11,7 @@ EdgeParts::EdgeParts(const Lattice& lattice, double band_m)
 std::span<const TilePart> EdgeParts::of(const DrawItem& item, int finest_level) {
     corner_ = lattice_.corner(item.tile);
     side_ = static_cast<double>(lattice_.tile_extent(item.tile.level));
-    finest_level_ = std::min(finest_level, 2);
+    finest_level_ = std::min(finest_level, 3);
     count_ = 0;
     add(item.part);
     return {parts_.data(), count_};

@@ -18,7 +18,7 @@ public:
     EdgeParts(const Lattice& lattice, double band_m);
 
     /// Parts of what the item draws that reach into the band, none coarser than need be and none finer than
-    /// `finest_level` (0 to 2) levels below the tile; what lies beyond the data is left out. Valid until the next call.
+    /// `finest_level` (0 to 3) levels below the tile; what lies beyond the data is left out. Valid until the next call.
     std::span<const TilePart> of(const DrawItem& item, int finest_level);
 
 private:
@@ -29,7 +29,7 @@ private:
     LatticePoint corner_;
     double side_ = 0;  ///< of the tile, cells
     int finest_level_ = 0;
-    std::array<TilePart, 16> parts_;
+    std::array<TilePart, 64> parts_;
     std::size_t count_ = 0;
 };
 

@@ -32,8 +32,8 @@ constexpr GLuint kBlendBinding = 2;
 
 /// Draws at the data's ends, per item that may be drawn.
 constexpr int kEdgeDraws = 2;
-/// Tiles there are drawn by parts of a quarter of their side: finer ones would be more draws for few pixels less.
-constexpr int kEdgePartLevel = 2;
+/// Tiles there are drawn by parts of an eighth of their side: finer ones would be more draws for few pixels less.
+constexpr int kEdgePartLevel = 3;
 
 using Clock = std::chrono::steady_clock;
 

@@ -35,7 +35,8 @@ struct RendererOptions {
     /// Items a frame at most. Each may be two draws, of 124 bytes each, and two more at the data's ends, of 20 bytes,
     /// three times.
     int max_draws = 4096;
-    /// 1: off; up to 16: sharper imagery at grazing angles; costs 5 to 6 ms at 800x800 on software OpenGL.
+    /// 1: off; up to 16: sharper imagery at grazing angles. Software OpenGL has one step of it, which doubles to triples
+    /// a frame (docs/numbers.md).
     double anisotropy = 1;
     /// Textures in one array at most, 1 to kMaxArrayLayers: fewer make more arrays, for tests.
     int max_array_layers = kMaxArrayLayers;

@@ -160,6 +160,62 @@ TEST_F(HeightCommand, TakesNegativeNumbersForValues) {
     EXPECT_FALSE(told[3].height);
 }
 
+// A place in a zone where PROJ's own answer is known to be near: 15 degrees east is UTM zone 33's middle.
+class LonLatOfHeights : public ::testing::Test {
+protected:
+    void SetUp() override {
+        write_heights(folder_.file("d.tif"), grid_, place_);
+        build_store_from({folder_.file("d.tif"), "--tile-size", "9", "--texture-size", "16"}, store_);
+        grid_of_store_ = (*SqliteStore::open(store_))->dataset().geo_grid;
+        ASSERT_TRUE(grid_of_store_);
+    }
+    // Shortest text that is the number again.
+    static std::string text(double number) { return nlohmann::json(number).dump(); }
+    LonLat lon_lat_of(double i, double j) const {
+        return *grid_of_store_->lon_lat(place_.x + i * place_.step, place_.y - j * place_.step);
+    }
+    TemporaryFolder folder_;
+    std::string store_ = folder_.file("d.scree");
+    HeightGrid grid_ = hills(40, 40, 5);
+    Place place_{499900, 5300000, 10, 32633, false};
+    std::optional<GeoGrid> grid_of_store_;
+};
+
+TEST_F(LonLatOfHeights, PointsMayBeLongitudesAndLatitudes) {
+    // 499900 m is 100 m west of 15 degrees.
+    EXPECT_NEAR(lon_lat_of(10, 0).longitude_deg, 15, 1e-7);
+    const LonLat a = lon_lat_of(7.25, 22.5), b = lon_lat_of(31, 3);
+    write_file(folder_.file("q.csv"), "lon,lat\n" + text(b.longitude_deg) + "," + text(b.latitude_deg) + "\n");
+    const auto told = told_by(scree({"height", store_, "--lonlat", text(a.longitude_deg), text(a.latitude_deg), "12.5",
+                                     "-33.25", "--file", folder_.file("q.csv")}));
+    ASSERT_EQ(told.size(), 3u);
+    EXPECT_EQ(told[0].x, a.longitude_deg);
+    EXPECT_EQ(told[0].y, a.latitude_deg);
+    ASSERT_TRUE(told[0].height && told[2].height);
+    EXPECT_NEAR(*told[0].height, on_triangles(grid_, 7, 22, 0.25, 0.5), 1e-3);
+    EXPECT_FALSE(told[1].height) << "elsewhere on the earth";
+    EXPECT_NEAR(*told[2].height, grid_.at(31, 3), 1e-3);
+    const auto json = report_of(scree(
+        {"height", store_, text(a.longitude_deg), text(a.latitude_deg), "12.5", "-33.25", "--lonlat", "--json", "-"}));
+    EXPECT_EQ(json["points"][0]["longitude_deg"], a.longitude_deg);
+    EXPECT_NEAR(json["points"][0]["x_m"], place_.x + 72.5, 1e-4);
+    EXPECT_EQ(json["points"][1]["present"], false);
+    EXPECT_FALSE(json["points"][1].contains("x_m"));
+}
+
+TEST_F(LonLatOfHeights, SaysWhatIsNoLatitudeAndWhichStoreKnowsNone) {
+    EXPECT_EQ(scree({"height", store_, "--lonlat", "15", "90.5"}).exit_code, 2);
+    EXPECT_EQ(scree({"height", store_, "--lonlat", "15"}).exit_code, 2);
+    write_file(folder_.file("q.csv"), "x,y\n15,47\n");
+    EXPECT_EQ(scree({"height", store_, "--lonlat", "--file", folder_.file("q.csv")}).exit_code, 3);
+    write_heights_u16(folder_.file("local.tif"), grid_, nullptr);
+    build_store_from({folder_.file("local.tif"), "--spacing", "10", "--texture-size", "16"},
+                     folder_.file("local.scree"));
+    const auto run = scree({"height", folder_.file("local.scree"), "--lonlat", "15", "47"});
+    EXPECT_EQ(run.exit_code, 3) << describe(run);
+    EXPECT_NE(run.err.find("coordinate system is unknown"), std::string::npos) << run.err;
+}
+
 TEST_F(HeightCommand, ARayMeetsWhatThePointsTell) {
     const auto run = scree({"height", store_, "--ray", "-.25", "9.5", "9000", "0", "0", "-2", "3", "9"});
     ASSERT_EQ(run.exit_code, 0) << describe(run);

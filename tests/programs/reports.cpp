@@ -53,7 +53,7 @@ nlohmann::json expect_sound_store(const std::string& store, const std::vector<do
 
     const nlohmann::json verified = report_of(scree({"verify", store, "--quiet", "--json", "-"}));
     expect_keys(verified, {"tiles_checked", "shared_samples_compared", "shared_samples_differing", "bounds_checked",
-                           "bound_violations", "problems"});
+                           "bound_violations", "lon_lat_note", "problems"});
     EXPECT_EQ(verified.value("tiles_checked", -1), info.value("height_tiles", 0) + info.value("texture_tiles", 0));
     EXPECT_EQ(verified.value("shared_samples_differing", -1), 0);
     EXPECT_EQ(verified.value("bound_violations", -1), 0);

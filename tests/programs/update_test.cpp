@@ -82,6 +82,24 @@ TEST_F(Updates, ANewImageIsBuiltWhereItLies) {
     expect_same_as_build({base}, {under, patch});
 }
 
+TEST_F(Updates, AStoreWithoutLongitudesGetsThem) {
+    const std::string base = dem("base.tif", 200, 160, 3), under = image("under.tif", 800, 640, 0, 0, 0);
+    build({base}, {under}, store_);
+    {
+        auto writer = SqliteStoreWriter::amend(store_);
+        ASSERT_TRUE(writer.ok());
+        Dataset old = (*SqliteStore::open(store_))->dataset();
+        ASSERT_TRUE(old.geo_grid);
+        old.geo_grid.reset();
+        ASSERT_TRUE((*writer)->finish(old).ok());
+    }
+    EXPECT_FALSE(report_of(scree({"info", store_, "--json", "-"})).contains("geo_grid"));
+    const std::string patch = image("patch.tif", 60, 40, 700, 300, 90);
+    report_of(update({"--imagery", patch}));
+    expect_same_as_build({base}, {under, patch});
+    EXPECT_TRUE(report_of(scree({"info", store_, "--json", "-"}))["geo_grid"].contains("error_m"));
+}
+
 TEST_F(Updates, RemovedImagesUncoverWhatLiesUnderThem) {
     const std::string base = dem("base.tif", 200, 160, 4), under = image("under.tif", 400, 640, 0, 0, 0),
                       patch = image("patch.tif", 300, 200, 600, 300, 90);

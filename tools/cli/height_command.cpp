@@ -133,7 +133,7 @@ Result<void> find_places(const Dataset& d, const std::string& store, Questions& 
             return Error{ErrorCode::input,
                          fmt::format("{}: knows no longitudes and latitudes: {}", store,
                                      d.crs.empty() ? "its coordinate system is unknown"
-                                                   : "it was made before stores had them; scree update adds them")};
+                                                   : "it was made before stores had them; its next update adds them")};
         if (!(std::abs(second) <= 90))
             return Error{ErrorCode::usage, fmt::format("{} is no latitude: LON LAT are degrees", second)};
         if (const auto place = d.geo_grid->place({first, second})) q.at = Point{(*place)[0], (*place)[1]};

@@ -124,19 +124,13 @@ int run_info(int argc, char** argv) {
                            {"fingerprint", s.fingerprint}});
     nlohmann::ordered_json corners_deg = nlohmann::ordered_json::array();
     for (const Corner& c : corners) corners_deg.push_back({c.longitude_deg, c.latitude_deg});
-    nlohmann::ordered_json geo_grid = nullptr;
-    if (d.geo_grid)
-        geo_grid = {{"nodes", {d.geo_grid->columns, d.geo_grid->rows}},
-                    {"box_m", d.geo_grid->box_m},
-                    {"error_m", d.geo_grid->error_m}};
-    const nlohmann::ordered_json out = {
+    nlohmann::ordered_json out = {
         {"format_version", kFormatVersion},
         {"crs", d.crs},
         {"crs_name", d.crs_name},
         {"vertical_datum", d.vertical_datum},
         {"origin_m", {l.origin_x_m, l.origin_y_m}},
         {"corners_deg", corners_deg},
-        {"geo_grid", geo_grid},
         {"spacing_m", l.spacing_m},
         {"cells", {l.cells_x, l.cells_y}},
         {"present_cells", d.present_cells},
@@ -162,6 +156,10 @@ int run_info(int argc, char** argv) {
         {"sources", sources},
         {"attribution", d.attribution},
         {"digest", digest}};
+    if (d.geo_grid)
+        out["geo_grid"] = {{"nodes", {d.geo_grid->columns, d.geo_grid->rows}},
+                           {"box_m", d.geo_grid->box_m},
+                           {"error_m", d.geo_grid->error_m}};
     if (auto ok = write_text(json, out.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
         !ok)
         return report_error("scree info", ok.error());

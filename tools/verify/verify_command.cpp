@@ -39,7 +39,7 @@ std::string to_json(const VerifyReport& report) {
                                    {"shared_samples_differing", report.shared_samples_differing},
                                    {"bounds_checked", report.bounds_checked},
                                    {"bound_violations", report.bound_violations},
-                                   {"lon_lat_error_m", nullptr},
+
                                    {"lon_lat_note", report.lon_lat.reason},
                                    {"problems", report.problems}};
     if (report.lon_lat.error_m) json["lon_lat_error_m"] = *report.lon_lat.error_m;

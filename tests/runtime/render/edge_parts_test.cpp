@@ -18,7 +18,7 @@ TEST(EdgeParts, HoldEveryCellOfTheBandOnceAndLittleElse) {
         const auto cells = [&] { return test::uniform(random, 1, 3 << cells_log2); };
         const Lattice lattice = *make_lattice(0, 0, 2, cells(), cells(), cells_log2);
         const double band_m = static_cast<double>(test::uniform(random, 1, 20));
-        const int finest = static_cast<int>(test::uniform(random, 0, 2));
+        const int finest = static_cast<int>(test::uniform(random, 0, 3));
         DrawItem item;
         const int level = static_cast<int>(test::uniform(random, 0, lattice.deepest_level));
         item.tile = {level, test::uniform(random, 0, (static_cast<int>(lattice.root_columns) << level) - 1),

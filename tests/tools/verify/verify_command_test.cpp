@@ -67,7 +67,8 @@ TEST_F(VerifyCommand, JsonOnStandardOutputStandsAlone) {
     std::vector<std::string> keys;
     for (const auto& item : json.items()) keys.push_back(item.key());
     EXPECT_EQ(keys, (std::vector<std::string>{"tiles_checked", "shared_samples_compared", "shared_samples_differing",
-                                              "bounds_checked", "bound_violations", "problems"}));
+                                              "bounds_checked", "bound_violations", "lon_lat_note", "problems"}));
+    EXPECT_NE(json["lon_lat_note"], "");
     EXPECT_EQ(json["problems"].size(), 1u);
     EXPECT_NE(output.err.find("problem: "), std::string::npos);
 }

@@ -3,8 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "tests/common/test_support.h"
 #include "tests/tools/verify/small_store.h"
+#include "tools/source/geo_grid_maker.h"
 
 namespace scree {
 namespace {
@@ -29,6 +32,50 @@ void expect_sound(const test::SmallTerrain& terrain) {
     EXPECT_TRUE(report.sound()) << joined(report.problems);
     EXPECT_EQ(report.tiles_checked, static_cast<std::int64_t>(store.heights.size() + store.textures.size()));
     EXPECT_GT(report.bounds_checked, 0);
+}
+
+test::SmallStore store_in_taiwan() {
+    test::SmallStore store = test::make_small_store({.cells_x = 16, .cells_y = 12});
+    Dataset& d = store.dataset;
+    d.lattice.origin_x_m = 300000;
+    d.lattice.origin_y_m = 2770000;
+    d.crs = "EPSG:32651";
+    d.geo_grid = make_geo_grid(d.lattice, d.crs);
+    EXPECT_TRUE(d.geo_grid);
+    return store;
+}
+
+TEST(VerifyLonLat, IsMeasuredAnewAndWithinWhatIsStated) {
+    const test::SmallStore store = store_in_taiwan();
+    const VerifyReport report = verify(store);
+    EXPECT_TRUE(report.sound()) << joined(report.problems);
+    ASSERT_TRUE(report.lon_lat.error_m);
+    EXPECT_EQ(report.lon_lat.reason, "");
+    EXPECT_GT(*report.lon_lat.error_m, 0);
+    EXPECT_LE(*report.lon_lat.error_m, store.dataset.geo_grid->error_m);
+}
+
+TEST(VerifyLonLat, AGridThatIsElsewhereIsAProblem) {
+    test::SmallStore store = store_in_taiwan();
+    for (double& side : store.dataset.geo_grid->box_m) side += 0.1;
+    const VerifyReport report = verify(store);
+    EXPECT_FALSE(report.sound());
+    ASSERT_TRUE(report.lon_lat.error_m);
+    EXPECT_NEAR(*report.lon_lat.error_m, std::sqrt(0.02), 0.01);
+    ASSERT_EQ(report.problems.size(), 1u);
+    EXPECT_NE(report.problems[0].find("longitudes and latitudes are off by 0.1"), std::string::npos)
+        << report.problems[0];
+}
+
+TEST(VerifyLonLat, SaysWhyNothingWasCompared) {
+    test::SmallStore store = store_in_taiwan();
+    store.dataset.crs = "EPSG:999999";
+    EXPECT_EQ(verify(store).lon_lat.reason, "PROJ does not know the CRS");
+    store.dataset.geo_grid.reset();
+    const VerifyReport report = verify(store);
+    EXPECT_EQ(report.lon_lat.reason, "the store has none");
+    EXPECT_FALSE(report.lon_lat.error_m);
+    EXPECT_TRUE(report.sound());
 }
 
 TEST(VerifySound, OneTile) { expect_sound({.cells_x = 4, .cells_y = 4, .texture_deepest_level = 0}); }
