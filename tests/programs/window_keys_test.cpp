@@ -115,8 +115,8 @@ TEST_F(WindowKeys, CirclesAndWalks) {
 TEST_F(WindowKeys, AClickGlidesThereAndADragDoesNot) {
     const Json clicked = report_after({"mousemove", "320", "260", "sleep", "0.5", "click", "1", "sleep", "2.5"});
     EXPECT_EQ(clicked.at("focused"), 1);
-    const Json dragged = report_after({"mousemove", "320", "260", "mousedown", "1", "mousemove", "400", "260", "sleep",
-                                       "0.2", "mouseup", "1", "sleep", "1"});
+    const Json dragged = report_after(
+        {"mousemove", "320", "260", "mousedown", "1", "mousemove", "400", "260", "mouseup", "1", "sleep", "1"});
     EXPECT_EQ(dragged.at("focused"), 0);
     EXPECT_NE(clicked.at("eye"), dragged.at("eye"));
     EXPECT_NE(dragged.at("look"), report_after({}).at("look")) << "a drag looks round";
