@@ -42,13 +42,11 @@ void PictureWriter::write(const std::filesystem::path& file, int width_px, int h
 
 std::vector<PictureWriter::Done> PictureWriter::take_done(bool all) {
     std::vector<Done> done;
-    for (auto job = jobs_.begin(); job != jobs_.end();) {
-        if (!all && job->outcome.wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
-            ++job;
-            continue;
-        }
-        done.push_back({job->file, job->outcome.get()});
-        job = jobs_.erase(job);
+    while (!jobs_.empty()) {
+        Job& job = jobs_.front();
+        if (!all && job.outcome.wait_for(std::chrono::seconds(0)) != std::future_status::ready) break;
+        done.push_back({job.file, job.outcome.get()});
+        jobs_.erase(jobs_.begin());
     }
     return done;
 }

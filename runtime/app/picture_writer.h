@@ -34,7 +34,7 @@ public:
         std::filesystem::path file;
         Result<void> outcome;
     };
-    /// What has ended since the last call; `all`: waits for the rest.
+    /// What has ended since the last call, in the order of write(); `all`: waits for the rest.
     std::vector<Done> take_done(bool all = false);
 
 private:

@@ -100,8 +100,7 @@ Result<void> Viewer::run() {
         wait();
     }
     if (recorder_.recording()) record();  // a flight that was not stopped is kept
-    for (const PictureWriter::Done& done : writer_.take_done(true))
-        if (!done.outcome) note("{}\n", done.outcome.error().message);
+    take_written(true);
     seconds_ = seconds_of(Clock::now() - start_);
     cpu_s_ = process_usage().cpu_seconds - cpu_s;
     return outcome;
@@ -183,10 +182,15 @@ void Viewer::take_answers() {
         profile_points_ = profile_.profile()->points.size();
         change_picture();
     }
-    for (const PictureWriter::Done& done : writer_.take_done()) {
+    take_written(false);
+}
+
+void Viewer::take_written(bool all) {
+    for (const PictureWriter::Done& done : writer_.take_done(all)) {
+        if (done.outcome) screenshots_.push_back(done.file.string());
+        if (!done.outcome) note("{}\n", done.outcome.error().message);
         say(done.outcome ? fmt::format("{} is written.", done.file.string())
                          : fmt::format("No picture: {}", done.outcome.error().message));
-        if (done.outcome) screenshots_.push_back(done.file.string());
     }
 }
 

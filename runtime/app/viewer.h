@@ -60,6 +60,7 @@ private:
     void move();
     void ask();
     void take_answers();
+    void take_written(bool all);
     Result<void> choose();
     Result<void> show();
     Result<void> draw_picture();

@@ -67,15 +67,18 @@ TEST_F(Window, ShowsTheTerrainMovesAndCloses) {
 TEST_F(Window, ShowsBlocksAndDikes) {
     Picture first, second;
     int step = 0;
+    double pressed_at = 0;
     const auto start = std::chrono::steady_clock::now();
     ProgramOptions options = options_;
     options.meanwhile = [&] {
         const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
         if (step == 0 && seconds > 2) {
             if (on_path("import")) first = screenshot(options_, folder_.file("1.png"));
+            if (first.colours <= 500 && on_path("import") && seconds < 30) return;  // a busy machine: not there yet
             key("key", "f");
+            pressed_at = seconds;
             ++step;
-        } else if (step == 1 && seconds > 3) {
+        } else if (step == 1 && seconds > pressed_at + 1.5) {
             if (on_path("import")) second = screenshot(options_, folder_.file("2.png"));
             key("key", "Escape");
             ++step;
