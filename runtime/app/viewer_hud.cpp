@@ -37,6 +37,7 @@ void Viewer::describe_place(HudModel& model) const {
         {"above", ground_m_ ? fmt::format("{} of the ground", length_text((eye.z - *ground_m_) / d.exaggeration))
                             : std::string("no ground under the eye")});
     const bool pointing = cursor_px_ && cursor_hit_.point;
+    model.place.push_back({"looking", direction_text(rig_.pose().look - eye)});
     model.place.push_back({"cursor", pointing ? place_text(*cursor_hit_.point, d) : std::string("-")});
     if (d.geo_grid)
         model.place.push_back({"", pointing ? lon_lat_text(*cursor_hit_.point, d).value_or("-") : std::string("-")});
