@@ -11,7 +11,7 @@ HudModel Viewer::hud_model() const {
     model.show_status = show_hud_;
     model.show_help = show_help_;
     const double mean_ms = history_.mean_ms();
-    model.title = fmt::format("{:.0f} fps   {:.1f} ms", mean_ms > 0 ? 1000 / mean_ms : 0, mean_ms);
+    model.title = fmt::format("{:.0f} fps   {:.1f} ms   F1: keys", mean_ms > 0 ? 1000 / mean_ms : 0, mean_ms);
     model.frame_ms.assign(history_.times_ms().begin(), history_.times_ms().end());
     stage_.describe(model);
     describe_place(model);
