@@ -136,8 +136,13 @@ Result<void> Viewer::take_input() {
     wishes_ = taken.rig;
     cursor_px_ = taken.cursor_px;
     if (taken.anything) change_overlay();
-    for (const Action action : taken.actions)
+    actions_.insert(actions_.end(), taken.actions.begin(), taken.actions.end());
+    // A screenshot shows what the keys before it did, and nothing of those after it.
+    while (!actions_.empty() && !screenshot_due_) {
+        const Action action = actions_.front();
+        actions_.erase(actions_.begin());
         if (auto ok = act(action); !ok) return ok;
+    }
     for (const glm::dvec2& at_px : taken.clicks_px) clicks_.push_back(ray_through(camera_, at_px));
     ask_click();
     return {};
@@ -230,6 +235,7 @@ Result<void> Viewer::show() {
         const auto start = Clock::now();
         picture_due_ = frame_.goes_on || replay_.has_value();
         if (auto ok = draw_picture(); !ok) return ok;
+        if (std::exchange(screenshot_due_, false)) take_screenshot();
         const double frame_ms = 1000 * seconds_of(Clock::now() - start);
         history_.add(frame_ms);
         const double before_px = governor_.tau_px();
@@ -283,7 +289,8 @@ void Viewer::draw_overlay() {
 }
 
 void Viewer::wait() {
-    const bool at_once = picture_due_ || overlays_due_ > 0 || rig_.moved() || rig_.gliding() || frame_.goes_on;
+    const bool at_once =
+        !actions_.empty() || picture_due_ || overlays_due_ > 0 || rig_.moved() || rig_.gliding() || frame_.goes_on;
     slept_ = !at_once;
     if (at_once) return glfwPollEvents();
     double seconds = frame_.expects ? kSoon_s : kIdle_s;

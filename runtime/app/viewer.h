@@ -136,6 +136,8 @@ private:
     std::vector<glm::dvec3> clicks_;                        ///< rays that are not asked for yet, oldest first
     std::uint64_t awaited_click_ = 0, awaited_middle_ = 0;  ///< questions; 0: none
     std::shared_ptr<const TileStore> asked_store_;
+    std::vector<Action> actions_;  ///< of keys, that are still to be done
+    bool screenshot_due_ = false;
     bool picture_due_ = true;
     int overlays_due_ = Hud::kFramesOfAChange;
 

@@ -107,7 +107,7 @@ void Viewer::act_on_view(Action action) {
 }
 
 void Viewer::act_on_files(Action action) {
-    if (action == Action::screenshot) take_screenshot();
+    if (action == Action::screenshot) screenshot_due_ = true;
     if (action == Action::record) record();
     if (action == Action::replay) replay();
 }

@@ -133,6 +133,30 @@ TEST_F(WindowKeys, WritesScreenshotsUnderNamesThatAreFree) {
     EXPECT_EQ(std::filesystem::file_size(here("scree-s-001.png")), 9u) << "overwritten";
 }
 
+TEST_F(WindowKeys, BoxesAndColoursAreInThePictureAndPanelsAreNot) {
+    const Json report = report_after({"sleep", "1",   "key", "F12", "key", "h",   "key", "F12", "key", "h",     "key",
+                                      "b",     "key", "F12", "key", "b",   "key", "1",   "key", "F12", "sleep", "2"});
+    ASSERT_EQ(report.at("screenshots").size(), 4u);
+    std::vector<Picture> pictures;
+    for (const auto& name : report.at("screenshots")) pictures.push_back(picture_of(here(name)));
+    EXPECT_EQ(pictures[0].rgb, pictures[1].rgb);
+    EXPECT_NE(pictures[1].rgb, pictures[2].rgb) << "no boxes";
+    EXPECT_NE(pictures[1].rgb, pictures[3].rgb) << "no colours";
+    EXPECT_NE(pictures[2].rgb, pictures[3].rgb);
+}
+
+TEST_F(WindowKeys, WhatIsFrozenIsNotChosenAnewWhileTheEyeMoves) {
+    const std::vector<std::string> ahead{"keydown", "w", "sleep", "2", "keyup", "w", "sleep", "1"};
+    std::vector<std::string> frozen{"key", "z"};
+    frozen.insert(frozen.end(), ahead.begin(), ahead.end());
+    const std::vector<std::string> method{"--lod", "rsg"};
+    const Json stood = report_after({"sleep", "1"}, method), flew = report_after(ahead, method),
+               froze = report_after(frozen, method);
+    EXPECT_NE(flew.at("triangles"), stood.at("triangles")) << "the flight tells nothing";
+    EXPECT_NE(froze.at("eye"), stood.at("eye"));
+    EXPECT_EQ(froze.at("triangles"), stood.at("triangles"));
+}
+
 TEST_F(WindowKeys, WhatIsRecordedIsFlownAgain) {
     const Json report = report_after({"key", "F9", "keydown", "w", "sleep", "1.5", "keyup", "w", "key", "F9", "key",
                                       "Home", "key", "F10", "sleep", "4"});
