@@ -38,6 +38,11 @@ int finish_output(const char* program, int code) {
 
 int report_error(const char* program, const Error& error) {
     note("{}: {}\n", program, error.message);
+    if (error.code == ErrorCode::display)
+        note(
+            "{}: shot, audit and fly --headless open no window; LIBGL_ALWAYS_SOFTWARE=1 draws without a GPU (Debian: "
+            "libegl1, libgl1-mesa-dri)\n",
+            program);
     return static_cast<int>(error.code);
 }
 

@@ -47,6 +47,19 @@ std::optional<std::string> lon_lat_text(const glm::dvec3& place, const Dataset& 
                        at->longitude_deg < 0 ? "W" : "E");
 }
 
+std::string direction_text(const glm::dvec3& direction) {
+    constexpr const char* kPoints[] = {"N", "NE", "E", "SE", "S", "SW", "W", "NW"};
+    constexpr double kAcross = 1e-3;  // of the length; below, what there is of a heading is rounding
+    const double across = std::hypot(direction.x, direction.y);
+    if (across <= kAcross * std::abs(direction.z)) return direction.z < 0 ? "straight down" : "straight up";
+    const auto pitch = std::lround(glm::degrees(std::atan2(direction.z, across)));
+    const auto heading = (std::lround(glm::degrees(std::atan2(direction.x, direction.y))) + 360) % 360;
+    const auto point = static_cast<std::size_t>((2 * heading + 45) / 90 % 8);
+    const std::string tilt =
+        pitch == 0 ? "level" : fmt::format("{}\xc2\xb0 {}", std::abs(pitch), pitch < 0 ? "down" : "up");
+    return fmt::format("{}\xc2\xb0 {}, {}", heading, kPoints[point], tilt);
+}
+
 std::string hour_text(double hour) {
     const auto minutes = static_cast<int>(std::lround(hour * 60)) % (24 * 60);
     return fmt::format("{}:{:02}", minutes / 60, minutes % 60);

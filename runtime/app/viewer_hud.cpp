@@ -11,7 +11,7 @@ HudModel Viewer::hud_model() const {
     model.show_status = show_hud_;
     model.show_help = show_help_;
     const double mean_ms = history_.mean_ms();
-    model.title = fmt::format("{:.0f} fps   {:.1f} ms", mean_ms > 0 ? 1000 / mean_ms : 0, mean_ms);
+    model.title = fmt::format("{:.0f} fps   {:.1f} ms   F1: keys", mean_ms > 0 ? 1000 / mean_ms : 0, mean_ms);
     model.frame_ms.assign(history_.times_ms().begin(), history_.times_ms().end());
     stage_.describe(model);
     describe_place(model);
@@ -37,6 +37,7 @@ void Viewer::describe_place(HudModel& model) const {
         {"above", ground_m_ ? fmt::format("{} of the ground", length_text((eye.z - *ground_m_) / d.exaggeration))
                             : std::string("no ground under the eye")});
     const bool pointing = cursor_px_ && cursor_hit_.point;
+    model.place.push_back({"looking", direction_text(rig_.pose().look - eye)});
     model.place.push_back({"cursor", pointing ? place_text(*cursor_hit_.point, d) : std::string("-")});
     if (d.geo_grid)
         model.place.push_back({"", pointing ? lon_lat_text(*cursor_hit_.point, d).value_or("-") : std::string("-")});

@@ -106,7 +106,9 @@ std::optional<std::size_t> plot_of(const Profile& profile) {
 DrawnPanel draw_profile(const HudModel::ProfilePanel& profile) {
     DrawnPanel panel;
     const ImVec2 size = ImGui::GetIO().DisplaySize;
-    const float em = ImGui::GetFontSize(), height = std::min(13 * em, 0.4f * size.y);
+    // No higher than its words until there are heights: the ground behind it is there to be clicked.
+    const float words = ImGui::GetFrameHeight() + 2 * ImGui::GetStyle().WindowPadding.y;
+    const float em = ImGui::GetFontSize(), height = profile.heights ? std::min(13 * em, 0.4f * size.y) : words;
     ImGui::SetNextWindowPos({0.75f * em, size.y - 0.75f * em}, ImGuiCond_Always, {0, 1});
     ImGui::SetNextWindowSize({size.x - 1.5f * em, height});
     ImGui::SetNextWindowBgAlpha(0.8f);

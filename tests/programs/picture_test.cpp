@@ -91,5 +91,30 @@ TEST_F(Picture, IsTheSameFromTheSameCommandTwice) {
     EXPECT_EQ(read_bytes(folder_.file("1.png")), read_bytes(folder_.file("2.png")));
 }
 
+TEST_F(Picture, LooksChangeWhatIsShownAndTheirDefaultsSaidAloudDoNot) {
+    const auto shot = [&](const std::vector<std::string>& looks) {
+        const std::string png = folder_.file("look.png");
+        std::vector<std::string> arguments{"shot", store_file_, "-o", png, "--size", "240x180"};
+        arguments.insert(arguments.end(), looks.begin(), looks.end());
+        const auto run = scree_view(arguments);
+        EXPECT_EQ(run.exit_code, 0) << describe(run);
+        return read_bytes(png);
+    };
+    if (!create_headless_context()) GTEST_SKIP() << "needs OpenGL 4.5 by surfaceless EGL";
+    const auto plain = shot({});
+    EXPECT_EQ(shot({"--msaa", "0", "--anisotropy", "1", "--edge", "soft"}), plain);
+    for (const std::vector<std::string>& looks : {std::vector<std::string>{"--msaa", "4"},
+                                                  {"--anisotropy", "8"},
+                                                  {"--edge", "hard"},
+                                                  {"--sun", "0,20"},
+                                                  {"--colour", "level"},
+                                                  {"--colour", "geomip"},
+                                                  {"--colour", "error"}})
+        EXPECT_NE(shot(looks), plain) << looks[0] << ' ' << looks[1];
+    EXPECT_EQ(shot({"--sun", "360,20"}), shot({"--sun", "0,20"}));
+    // Magenta shows every pixel that no terrain covers, whatever the edge.
+    EXPECT_EQ(shot({"--magenta"}), shot({"--magenta", "--edge", "hard"}));
+}
+
 }  // namespace
 }  // namespace scree::test

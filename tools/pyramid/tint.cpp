@@ -37,7 +37,8 @@ void Tint::row(std::span<const double> upper, std::span<const double> lower, std
     for (std::size_t i = 0; i + 1 < upper.size(); ++i) {
         const double nw = upper[i], ne = upper[i + 1], sw = lower[i], se = lower[i + 1];
         const double light = relief_light((ne + se - nw - sw) * per_2_spacings_, (nw + ne - sw - se) * per_2_spacings_);
-        const bool water = nw <= 0 && ne == nw && sw == nw && se == nw;
+        // Flat and at sea level; flats below it, as Death Valley's, are dry.
+        const bool water = nw <= 0 && nw > -1 && ne == nw && sw == nw && se == nw;
         const TintColour c = water ? kWater : colours_.at((nw + ne + sw + se) / 4);
         // Sunlight is yellow, what falls into shade is the sky's blue.
         const double off = light - 1;

@@ -69,6 +69,8 @@ TEST(Tint, FlatSeaIsBlueAndFlatLandIsNot) {
     const auto sea = tinted({0, 0}, {0, 0}, o), land = tinted({10, 10}, {10, 10}, o);
     EXPECT_GT(sea[2], sea[0]);
     EXPECT_GT(land[1], land[2]);
+    const auto salt_flat = tinted({-85, -85}, {-85, -85}, {-86, 1000, 10});
+    EXPECT_GT(salt_flat[1], salt_flat[2]);
 }
 
 TEST(Tint, EqualHeightsEverywhereHaveAColour) {
