@@ -100,6 +100,8 @@ TEST_F(ExitCodes, WrongUseIsTwo) {
     for (const auto& arguments : wrong) expect_refused(scree(arguments), kUsage, {});
     const std::vector<std::vector<std::string>> wrong_views = {
         {"audit", store_, "--tau", "-1"},
+        {"audit", store_, "--exaggeration", "0"},
+        {"shot", store_, "-o", other_, "--exaggeration", "101"},
         {"audit", store_, "--tau", "nan"},
         {"audit", store_, "--fov", "0"},
         {"audit", store_, "--fov", "180"},

@@ -27,19 +27,24 @@ HeightGrid analytic(int width, int height, double sharp, int shifted = 0) {
 
 class Warped : public ::testing::Test {
 protected:
-    ProgramRun audit(const std::vector<std::string>& against, const std::string& tau) {
-        std::vector<std::string> arguments{"audit", store_, "--tau", tau, "--frames", "6", "--json", "-", "--against"};
+    ProgramRun audit(const std::vector<std::string>& against, const std::string& tau,
+                     const std::string& exaggeration = "1") {
+        std::vector<std::string> arguments{"audit",    store_, "--tau",  tau, "--exaggeration", exaggeration,
+                                           "--frames", "6",    "--json", "-", "--against"};
         arguments.insert(arguments.end(), against.begin(), against.end());
         ProgramOptions options;
         options.environment = {"PATH=" + std::filesystem::path(SCREE_PROGRAM).parent_path().string()};
         return scree_view(arguments, options);
     }
     void expect_kept(const std::vector<std::string>& against, std::int64_t least_samples) {
-        for (const char* tau : {"0.05", "1", "4"}) {
-            const auto report = report_of(audit(against, tau));
+        for (const auto& [tau, exaggeration] :
+             {std::pair("0.05", "1"), std::pair("1", "1"), std::pair("4", "1"), std::pair("1", "10")}) {
+            const auto report = report_of(audit(against, tau, exaggeration));
+            EXPECT_EQ(report.value("kept", false), true);
             ASSERT_TRUE(report.contains("against")) << report.dump();
             EXPECT_EQ(report["against"]["samples_not_drawn"], 0);
-            EXPECT_GT(report["against"]["samples"], least_samples);
+            // High above, less is in view.
+            EXPECT_GT(report["against"]["samples"], std::string(exaggeration) == "1" ? least_samples : 500);
             EXPECT_LE(report["against"]["max_error_less_stated_px"].get<double>(), std::stod(tau) + 1e-3);
         }
     }
