@@ -117,6 +117,13 @@ TEST_F(LineRendererTest, WhatLiesBehindTheEyeIsCutOffAndNotMirrored) {
         for (int x = 0; x < kSize_px; ++x) ASSERT_EQ(picture.at(x, y), (std::array<int, 3>{255, 0, 255})) << x << y;
 }
 
+TEST_F(LineRendererTest, WhatIsNearerThanTheNearPlaneIsNotDrawn) {
+    make();
+    // 5 cm below the eye, which sees from 10 cm on; and 15 cm.
+    EXPECT_EQ(draw(from_above(), {{{-0.02, 0, 49.95}, {0.02, 0, 49.95}}}, 5).rgb, draw(from_above(), {}, 5).rgb);
+    EXPECT_EQ(draw(from_above(), {{{-0.02, 0, 49.85}, {0.02, 0, 49.85}}}, 5).red(50, 49), 255);
+}
+
 TEST_F(LineRendererTest, NumbersThatAreNoneDrawNothing) {
     make();
     const double none = std::nan(""), endless = HUGE_VAL;
