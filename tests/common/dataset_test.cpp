@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "tests/common/test_support.h"
@@ -85,6 +86,26 @@ TEST(DatasetJson, TheLevelOfTheCoarsestLeafIsSaidWhereDepthVariesOnly) {
         bad["coarsest_leaf_level"] = value;
         EXPECT_FALSE(dataset_from_json(bad.dump()).ok()) << value;
     }
+}
+
+TEST(Dataset, ExaggeratedIsAllThatIsInMetresOfHeightAndNothingElse) {
+    const Dataset plain = example();
+    Dataset d = plain;
+    ASSERT_TRUE(d.exaggerate(4).ok());
+    EXPECT_EQ(d.exaggeration, 4);
+    EXPECT_EQ(d.height_offset_m, 4 * plain.height_offset_m);
+    EXPECT_EQ(d.height_quantum_m, 4 * plain.height_quantum_m);
+    EXPECT_EQ(d.height_quantum_error_m, 4 * plain.height_quantum_error_m);
+    EXPECT_EQ(d.warp_error_m, 4 * plain.warp_error_m);
+    EXPECT_EQ(d.min_height_m, 4 * plain.min_height_m);
+    EXPECT_EQ(d.max_height_m, 4 * plain.max_height_m);
+    EXPECT_EQ(d.lattice, plain.lattice);
+    ASSERT_TRUE(d.exaggerate(0.25).ok());
+    EXPECT_EQ(dataset_to_json(d), dataset_to_json(plain));
+    for (const double factor : {0.0, -1.0, 0.009, 101.0, std::nan("")})
+        EXPECT_EQ(d.exaggerate(factor).error().code, ErrorCode::usage) << factor;
+    d.height_quantum_m = 1e5;
+    EXPECT_EQ(d.exaggerate(100).error().code, ErrorCode::usage) << "a quantum of 10 000 km";
 }
 
 TEST(DatasetJson, NumbersKeepEveryBit) {

@@ -136,6 +136,57 @@ INSTANTIATE_TEST_SUITE_P(
                     Region{"Strip", "EPSG:32633", 300000, 6000000, 5, 40000, 40}),
     [](const auto& region) { return std::string(region.param.name); });
 
+// What the format says of it: readers of another make must give the same answer.
+TEST(GeoGridFormat, ThePolynomialGoesThroughTheEightNodesAround) {
+    const auto longitude_at = [](double column, int node) {
+        GeoGrid grid;
+        grid.columns = 12;
+        grid.rows = 2;
+        grid.box_m = {0, 0, 11, 1};
+        grid.normals.assign(24, normal_of({0, 0}));
+        for (const int k : {node, node + 12}) grid.normals[static_cast<std::size_t>(k)] = normal_of({1e-3, 0});
+        return grid.lon_lat(column, 0.5)->longitude_deg / 1e-3;
+    };
+    const auto expect_nodes = [&](double column, int first) {
+        double sum = 0;
+        for (int node = 0; node < 12; ++node) {
+            const double weight = longitude_at(column, node);
+            EXPECT_EQ(std::abs(weight) > 1e-6, node >= first && node < first + 8) << column << ' ' << node;
+            sum += weight;
+        }
+        EXPECT_NEAR(sum, 1, 1e-6);
+    };
+    expect_nodes(5.5, 2);
+    expect_nodes(4.1, 1);
+    expect_nodes(0.5, 0);
+    expect_nodes(2.9, 0);
+    expect_nodes(10.5, 4);
+    EXPECT_NEAR(longitude_at(5.5, 5), 1225.0 / 2048, 1e-6);
+    EXPECT_NEAR(longitude_at(5.5, 2), -5.0 / 2048, 1e-6);
+}
+
+TEST(GeoGridFormat, TheTextIsThatOfTheDocument) {
+    GeoGrid grid;
+    grid.columns = grid.rows = 2;
+    for (const LonLat& at : {LonLat{0, 0}, LonLat{90, 0}, LonLat{0, 90}, LonLat{180, 0}})
+        grid.normals.push_back(normal_of(at));
+    // q = 2^32 (1, 0, 0), (0, 1, 0), (0, 0, 1), (-1, 0, 0). The last's residual: q - west - north + northwest.
+    const std::vector<std::vector<std::int64_t>> residuals{{1, 0, 0}, {-1, 1, 0}, {-1, 0, 1}, {0, -1, -1}};
+    std::vector<std::uint8_t> bytes;
+    for (const auto& node : residuals)
+        for (const std::int64_t r : node) {
+            std::uint64_t zigzag = r < 0 ? std::uint64_t{0x1FFFFFFFF} : r > 0 ? std::uint64_t{0x200000000} : 0;
+            for (; zigzag >= 128; zigzag >>= 7) bytes.push_back(static_cast<std::uint8_t>(zigzag % 128 + 128));
+            bytes.push_back(static_cast<std::uint8_t>(zigzag));
+        }
+    const std::string text = normals_to_text(grid);
+    EXPECT_EQ(text.size(), (bytes.size() * 8 + 5) / 6);
+    EXPECT_EQ(text.substr(0, 8), "gICAgCAA") << "80 80 80 80 20, 00";
+    const auto back = normals_from_text(text, 2, 2);
+    ASSERT_TRUE(back.ok());
+    EXPECT_EQ((*back)[3], (std::array<double, 3>{-1, 0, 0}));
+}
+
 TEST(GeoGridMaker, TakesNoMoreNodesThanItNeeds) {
     const Lattice window = *make_lattice(300000, 2790000, 20, 1000, 1000, 5);
     const auto grid = make_geo_grid(window, "EPSG:32651");
