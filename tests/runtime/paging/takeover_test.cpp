@@ -43,6 +43,12 @@ SyntheticTerrain state(int number, std::int64_t cells_y = 64) {
 
 std::shared_ptr<const TileStore> borrowed(const MemoryStore& store) { return {std::shared_ptr<void>(), &store}; }
 
+// Stands behind the stores of a test: the pager goes before them, for its threads may still be reading.
+struct Closing {
+    std::unique_ptr<Pager>& pager;
+    ~Closing() { pager.reset(); }
+};
+
 class Takeover : public testing::Test {
 protected:
     static constexpr int kThreads = 3;
@@ -162,6 +168,7 @@ TEST_F(Takeover, RandomFlightsOverManyStatesNeverMixThemAndNeverLeaveAHole) {
         SCOPED_TRACE("round " + std::to_string(round));
         std::vector<std::unique_ptr<MemoryStore>> stores;
         for (const SyntheticTerrain& s : states) stores.push_back(std::make_unique<MemoryStore>(s, round % 2 * 200));
+        const Closing closing{pager_};
         const std::int64_t roots = 4;
         open(states[0], *stores[0],
              {2 * roots + test::uniform(random, 0, 40), 2 * roots + test::uniform(random, 0, 40),
@@ -207,6 +214,7 @@ TEST_F(Takeover, RandomFlightsOverManyStatesNeverMixThemAndNeverLeaveAHole) {
 TEST_F(Takeover, WhatWasBeingReadOfTheOldStateIsThrownAway) {
     const SyntheticTerrain old = state(1), now = state(2);
     const MemoryStore old_store(old), now_store(now);
+    const Closing closing{pager_};
     open(old, old_store, {20, 20, 2, 0});
     const std::int64_t before = old_store.reads_begun();
     old_store.hold();
@@ -237,6 +245,7 @@ TEST_F(Takeover, WhatIsReadAfterAnUpdateIsNeitherShownNorCalledDamaged) {
     const SyntheticTerrain old = state(1), now = state(2);
     MemoryStore old_store(old);
     const MemoryStore now_store(now);
+    const Closing closing{pager_};
     const TileId good{1, 0, 0}, gone{1, 1, 0};
     old_store.damage(TileKind::height, gone, Damage::missing);
     open(old, old_store, {20, 20, 4, 0});
@@ -271,6 +280,7 @@ TEST_F(Takeover, DamagedTilesOfTheOldStateAreAskedForAnew) {
     const SyntheticTerrain old = state(1), bad = state(2), now = state(3);
     const MemoryStore old_store(old), now_store(now);
     MemoryStore bad_store(bad);
+    const Closing closing{pager_};
     bad_store.damage(TileKind::height, {1, 0, 0}, Damage::checksum);
     open(old, old_store, {20, 20, 4, 0});
     const auto take_over = [&](const SyntheticTerrain& terrain, const MemoryStore& store) {
@@ -294,6 +304,7 @@ TEST_F(Takeover, ADamagedRootLeavesWhatIsShown) {
     const MemoryStore old_store(old), now_store(now);
     for (const TileKind kind : {TileKind::height, TileKind::texture}) {
         MemoryStore bad_store(bad);
+        const Closing closing{pager_};
         bad_store.damage(kind, {0, 0, 0}, Damage::checksum);
         damage_.clear();
         open(old, old_store, {20, 20, 4, 0});
@@ -321,6 +332,7 @@ TEST_F(Takeover, ADamagedRootLeavesWhatIsShown) {
 TEST_F(Takeover, NoCallOfTheFrameLoopWaitsForAHeldUpStore) {
     const SyntheticTerrain old = state(1), now = state(2);
     const MemoryStore old_store(old), now_store(now);
+    const Closing closing{pager_};
     open(old, old_store, {20, 20, 4, 0});
     settle(0.5, 20, 20);
     now_store.hold();
