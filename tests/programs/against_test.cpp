@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include "tests/common/test_support.h"
+#include "tests/programs/pinhole.h"
 #include "tests/programs/ply_surface.h"
 #include "tests/programs/reports.h"
 #include "tests/programs/sample_inputs.h"
@@ -19,52 +20,9 @@
 namespace scree::test {
 namespace {
 
-using Vec3 = std::array<double, 3>;
-Vec3 operator-(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vec3 cross(const Vec3& a, const Vec3& b) {
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-Vec3 unit(const Vec3& a) {
-    const double length = std::sqrt(dot(a, a));
-    return {a[0] / length, a[1] / length, a[2] / length};
-}
-std::string words_of(const Vec3& p) {
-    std::ostringstream out;
-    out.precision(17);
-    out << p[0] << ',' << p[1] << ',' << p[2];
-    return out.str();
-}
-
 constexpr int kWidthPx = 480, kHeightPx = 360;
 constexpr double kFovDeg = 40;
 constexpr double kRoundingPx = 1e-3;  // floats on screen, doubles here
-
-struct Picture {
-    Vec3 eye, right, up, forward;
-    double focal_px = 1;
-    Picture(const Vec3& from, const Vec3& look) : eye(from), forward(unit(look - from)) {
-        right = unit(cross(forward, {0, 0, 1}));
-        up = cross(right, forward);
-        focal_px = kHeightPx / 2.0 / std::tan(kFovDeg * std::numbers::pi / 360);
-    }
-    // Pixels from the picture's middle; nullopt behind the near plane.
-    std::optional<std::array<double, 2>> project(const Vec3& p) const {
-        const Vec3 v = p - eye;
-        const double depth = dot(v, forward);
-        if (depth <= 0.1) return std::nullopt;
-        return std::array{focal_px * dot(v, right) / depth, focal_px * dot(v, up) / depth};
-    }
-    bool shows(const Vec3& p) const {
-        const auto at = project(p);
-        return at && std::abs((*at)[0]) <= kWidthPx / 2.0 && std::abs((*at)[1]) <= kHeightPx / 2.0;
-    }
-    // Between the projections of two points over one place; infinite where one of them has none.
-    double distance_px(const Vec3& p, double other_z) const {
-        const auto a = project(p), b = project({p[0], p[1], other_z});
-        return a && b ? std::hypot((*a)[0] - (*b)[0], (*a)[1] - (*b)[1]) : std::numeric_limits<double>::infinity();
-    }
-};
 
 struct Raster {
     double x0 = 0, y0 = 0, dx = 1, dy = 1;
@@ -196,7 +154,7 @@ void Against::check(const Vec3& eye, const Vec3& look, double tau_px) const {
     ASSERT_FALSE(surface.mesh().triangles.empty());
     EXPECT_EQ(surface.mesh().triangles.size(), report.value("triangles", std::size_t{0}));
 
-    const Picture picture(eye, look);
+    const Pinhole picture(eye, look, kFovDeg, kWidthPx, kHeightPx);
     std::int64_t seen = 0, holes = 0;
     double worst_px = 0, worst_excess_px = -std::numeric_limits<double>::infinity(), worst_spread_m = 0;
     for (std::int64_t row = 0; row < source_.rows; ++row)

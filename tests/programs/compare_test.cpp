@@ -9,13 +9,13 @@
 #include <set>
 #include <sstream>
 
-#include "tests/common/test_support.h"
+#include "tests/programs/land_store.h"
 #include "tests/programs/reports.h"
 
 namespace scree::test {
 namespace {
 
-constexpr int kUsage = 2, kInput = 3, kNoDisplay = 6;
+constexpr int kUsage = 2, kInput = 3;
 
 std::string text_of(const std::string& file) {
     std::ifstream in(file, std::ios::binary);
@@ -38,36 +38,24 @@ std::vector<std::string> joined(std::vector<std::string> a, const std::vector<st
 
 class Comparing : public ::testing::Test {
 protected:
-    static void SetUpTestSuite() {
-        folder_ = std::make_unique<TemporaryFolder>();
-        ASSERT_EQ(
-            scree({"synth", "-o", folder_->file("land"), "--size", "257", "--imagery-scale", "2", "--quiet"}).exit_code,
-            0);
-        const auto built = scree({"build", folder_->file("land/dem.tif"), "--imagery", folder_->file("land/ortho.tif"),
-                                  "-o", store(), "--texture-size", "64", "--tile-size", "33", "--quiet"});
-        ASSERT_EQ(built.exit_code, 0) << describe(built);
-        can_draw_ =
-            scree_view({"shot", store(), "-o", folder_->file("can.png"), "--size", "32x32"}).exit_code != kNoDisplay;
-    }
-    static void TearDownTestSuite() { folder_.reset(); }
+    static void SetUpTestSuite() { land_ = std::make_unique<LandStore>("land.scree"); }
+    static void TearDownTestSuite() { land_.reset(); }
     void SetUp() override {
-        if (!can_draw_) GTEST_SKIP() << "needs OpenGL 4.5 by surfaceless EGL";
+        if (!land_->can_draw()) GTEST_SKIP() << "needs OpenGL 4.5 by surfaceless EGL";
     }
-    static std::string store() { return folder_->file("land.scree"); }
+    static std::string store() { return land_->store(); }
     /// A comparison of few pixels, poses and rounds.
     static std::vector<std::string> small(const std::vector<std::string>& more) {
         return joined({"compare", store(), "--size", "200x160", "--frames", "3", "--rounds", "1"}, more);
     }
 
-    static std::unique_ptr<TemporaryFolder> folder_;
-    static bool can_draw_;
+    static std::unique_ptr<LandStore> land_;
 };
-std::unique_ptr<TemporaryFolder> Comparing::folder_;
-bool Comparing::can_draw_ = false;
+std::unique_ptr<LandStore> Comparing::land_;
 
 TEST_F(Comparing, MeasuresEveryMethodAndSaysItThreeTimes) {
-    const std::string report_folder = folder_->file("report/");
-    const std::string csv_file = folder_->file("table.csv");
+    const std::string report_folder = land_->file("report/");
+    const std::string csv_file = land_->file("table.csv");
     // So short a step that `audit` looks from the same places.
     const auto run = scree_view(
         small({"--taus", "0.5,2,8", "--step", "1e-9", "--report", report_folder, "--csv", csv_file, "--json", "-"}));
@@ -149,7 +137,7 @@ TEST_F(Comparing, RecommendsACommandLineThatCanBeTyped) {
     std::string line = run.out.substr(std::string("scree-view view").size());
     line.pop_back();
     const auto shot = run_program(
-        "/bin/sh", {"-c", "'" SCREE_VIEW_PROGRAM "' shot" + line + " -o '" + folder_->file("typed.png") + "'"});
+        "/bin/sh", {"-c", "'" SCREE_VIEW_PROGRAM "' shot" + line + " -o '" + land_->file("typed.png") + "'"});
     EXPECT_EQ(shot.exit_code, 0) << describe(shot);
 }
 
@@ -164,7 +152,7 @@ TEST_F(Comparing, SaysWhatComesClosestWhereNothingFits) {
 }
 
 TEST_F(Comparing, ReplacesNothingButAnEarlierReport) {
-    const std::string mine = folder_->file("mine");
+    const std::string mine = land_->file("mine");
     std::filesystem::create_directory(mine);
     write_bytes(mine + "/letter.txt", {'x'});
     for (const bool forced : {false, true}) {
@@ -177,7 +165,7 @@ TEST_F(Comparing, ReplacesNothingButAnEarlierReport) {
     }
     EXPECT_EQ(scree_view(small({"--report", mine + "/letter.txt", "--quiet"})).exit_code, kUsage);
 
-    const std::string old = folder_->file("old");
+    const std::string old = land_->file("old");
     std::filesystem::create_directory(old);
     write_bytes(old + "/index.html", {'x'});
     const std::vector<std::string> quick = small({"--taus", "8", "--report", old, "--quiet"});
@@ -190,7 +178,7 @@ TEST_F(Comparing, ReplacesNothingButAnEarlierReport) {
     EXPECT_EQ(replaced.err, "") << "--quiet";
     expect_only(old, {"index.html", "comparison.csv", "comparison.json"});
     EXPECT_GT(text_of(old + "/index.html").size(), 1000u);
-    for (const auto& file : std::filesystem::directory_iterator(folder_->file("")))
+    for (const auto& file : std::filesystem::directory_iterator(land_->file("")))
         EXPECT_EQ(file.path().string().find(".partial"), std::string::npos) << file.path();
 }
 
@@ -213,7 +201,7 @@ TEST_F(Comparing, WrongUseIsToldBeforeAnythingIsMeasured) {
         EXPECT_EQ(run.err.find(" %"), std::string::npos) << "no progress\n" << run.err;
     }
     EXPECT_EQ(scree_view({"compare"}).exit_code, kUsage);
-    EXPECT_EQ(scree_view({"compare", folder_->file("missing.scree")}).exit_code, kInput);
+    EXPECT_EQ(scree_view({"compare", land_->file("missing.scree")}).exit_code, kInput);
 }
 
 }  // namespace

@@ -9,88 +9,13 @@
 #include <sstream>
 
 #include "tests/common/test_support.h"
+#include "tests/programs/pinhole.h"
+#include "tests/programs/ply_surface.h"
 #include "tests/programs/reports.h"
 #include "tests/programs/sample_inputs.h"
 
 namespace scree::test {
 namespace {
-
-using Vec3 = std::array<double, 3>;
-Vec3 operator-(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vec3 cross(const Vec3& a, const Vec3& b) {
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-Vec3 unit(const Vec3& a) {
-    const double length = std::sqrt(dot(a, a));
-    return {a[0] / length, a[1] / length, a[2] / length};
-}
-
-struct Mesh {
-    std::vector<Vec3> vertices;
-    std::vector<std::array<std::int32_t, 3>> triangles;
-};
-
-Mesh read_ply(const std::string& path) {
-    Mesh mesh;
-    const auto bytes = read_bytes(path);
-    const std::string text(bytes.begin(), bytes.end());
-    const std::size_t body = text.find("end_header\n");
-    EXPECT_NE(body, std::string::npos);
-    if (body == std::string::npos) return mesh;
-    std::istringstream header(text.substr(0, body));
-    std::size_t vertex_count = 0, face_count = 0;
-    for (std::string word; header >> word;)
-        if (word == "element") {
-            std::size_t count = 0;
-            header >> word >> count;
-            (word == "vertex" ? vertex_count : face_count) = count;
-        }
-    const std::uint8_t* at = bytes.data() + body + 11;
-    EXPECT_EQ(bytes.size(), body + 11 + vertex_count * 24 + face_count * 13);
-    if (bytes.size() != body + 11 + vertex_count * 24 + face_count * 13) return mesh;
-    mesh.vertices.resize(vertex_count);
-    std::memcpy(mesh.vertices.data(), at, vertex_count * 24);
-    at += vertex_count * 24;
-    for (std::size_t k = 0; k < face_count; ++k, at += 13) {
-        EXPECT_EQ(at[0], 3);
-        std::array<std::int32_t, 3> corners{};
-        std::memcpy(corners.data(), at + 1, 12);
-        mesh.triangles.push_back(corners);
-    }
-    return mesh;
-}
-
-// A pinhole camera from the contract's words: vertical field of view in degrees, z up, square pixels.
-struct Pinhole {
-    Vec3 eye, right, up, forward;
-    double focal = 1, half_width = 1, half_height = 1;
-    Pinhole(const Vec3& e, const Vec3& look, double fov_deg, int width, int height) : eye(e) {
-        forward = unit(look - eye);
-        right = unit(cross(forward, {0, 0, 1}));
-        up = cross(right, forward);
-        focal = height / 2.0 / std::tan(fov_deg * std::numbers::pi / 360);
-        half_width = width / 2.0;
-        half_height = height / 2.0;
-    }
-    // False when not in the picture.
-    bool project(const Vec3& p, double& x, double& y) const {
-        const Vec3 v = p - eye;
-        const double depth = dot(v, forward);
-        if (depth <= 0.1) return false;
-        x = focal * dot(v, right) / depth;
-        y = focal * dot(v, up) / depth;
-        return std::abs(x) <= half_width && std::abs(y) <= half_height;
-    }
-};
-
-std::string number(double v) {
-    std::ostringstream out;
-    out.precision(17);
-    out << v;
-    return out.str();
-}
-std::string point(const Vec3& p) { return number(p[0]) + "," + number(p[1]) + "," + number(p[2]); }
 
 class DrawnMeshFile : public ::testing::Test {
 protected:
@@ -120,14 +45,14 @@ void DrawnMeshFile::check(const Vec3& eye, const Vec3& look, double tau, const s
 }
 
 void DrawnMeshFile::check(const Vec3& eye, const Vec3& look, double tau, const std::string& budget, bool morph) {
-    SCOPED_TRACE("from " + point(eye) + " at tau " + number(tau) + (morph ? " with morph" : ""));
+    SCOPED_TRACE("from " + words_of(eye) + " at tau " + std::to_string(tau) + (morph ? " with morph" : ""));
     const std::string ply = folder_.file("m.ply");
     std::vector<std::string> words{"shot",        folder_.file("d.scree"),
                                    "-o",          folder_.file("m.png"),
                                    "--mesh",      ply,
-                                   "--eye",       point(eye),
-                                   "--look",      point(look),
-                                   "--tau",       number(tau),
+                                   "--eye",       words_of(eye),
+                                   "--look",      words_of(look),
+                                   "--tau",       std::to_string(tau),
                                    "--size",      "400x300",
                                    "--budget",    budget,
                                    "--curvature", "off",
@@ -136,7 +61,7 @@ void DrawnMeshFile::check(const Vec3& eye, const Vec3& look, double tau, const s
     const auto run = scree_view(words);
     const auto report = report_of(run);
     const double promised = std::max(tau, report.value("max_bound_px", 1e9));
-    const Mesh mesh = read_ply(ply);
+    const PlyMesh mesh = read_ply(ply);
     ASSERT_FALSE(mesh.triangles.empty());
     EXPECT_EQ(mesh.triangles.size(), report.value("triangles", std::size_t{0}));
 
@@ -223,18 +148,15 @@ void DrawnMeshFile::check(const Vec3& eye, const Vec3& look, double tau, const s
     for (int j = 0; j + 1 < kHeight; ++j)
         for (int i = 0; i + 1 < kWidth; ++i) {
             if (!present(i, j)) continue;
-            double x = 0, y = 0, shown_x = 0, shown_y = 0;
             const Vec3 centre{
                 place_.x + (i + 0.5) * place_.step, place_.y - (j + 0.5) * place_.step,
                 (grid_.at(i, j) + grid_.at(i + 1, j) + grid_.at(i, j + 1) + grid_.at(i + 1, j + 1)) / 4.0};
-            ASSERT_TRUE(!camera.project(centre, x, y) || cover.contains({i, j})) << "hole at cell " << i << ", " << j;
+            ASSERT_TRUE(!camera.shows(centre) || cover.contains({i, j})) << "hole at cell " << i << ", " << j;
             for (const auto& [vi, vj] : {std::pair{i, j}, {i + 1, j}, {i, j + 1}, {i + 1, j + 1}}) {
-                Vec3 p = sample(vi, vj);
+                const Vec3 p = sample(vi, vj);
                 const auto z = drawn.find({vi, vj});
-                if (!camera.project(p, x, y) || z == drawn.end()) continue;
-                p[2] = z->second;
-                if (!camera.project(p, shown_x, shown_y)) continue;
-                worst_px = std::max(worst_px, std::hypot(x - shown_x, y - shown_y));
+                if (!camera.shows(p) || z == drawn.end() || !camera.shows({p[0], p[1], z->second})) continue;
+                worst_px = std::max(worst_px, camera.distance_px(p, z->second));
                 ++seen;
             }
         }

@@ -6,14 +6,14 @@
 #include <fstream>
 #include <sstream>
 
-#include "tests/common/test_support.h"
+#include "tests/programs/land_store.h"
 #include "tests/programs/reports.h"
 #include "tests/runtime/report/html_support.h"
 
 namespace scree::test {
 namespace {
 
-constexpr int kUsage = 2, kNoDisplay = 6;
+constexpr int kUsage = 2;
 
 std::string text_of(const std::string& file) {
     std::ifstream in(file, std::ios::binary);
@@ -28,38 +28,26 @@ std::string browser() {
 
 class Reporting : public ::testing::Test {
 protected:
-    static void SetUpTestSuite() {
-        folder_ = std::make_unique<TemporaryFolder>();
-        ASSERT_EQ(
-            scree({"synth", "-o", folder_->file("land"), "--size", "257", "--imagery-scale", "2", "--quiet"}).exit_code,
-            0);
-        const auto built = scree({"build", folder_->file("land/dem.tif"), "--imagery", folder_->file("land/ortho.tif"),
-                                  "-o", store(), "--texture-size", "64", "--tile-size", "33", "--quiet"});
-        ASSERT_EQ(built.exit_code, 0) << describe(built);
-        can_draw_ =
-            scree_view({"shot", store(), "-o", folder_->file("can.png"), "--size", "32x32"}).exit_code != kNoDisplay;
-    }
-    static void TearDownTestSuite() { folder_.reset(); }
-    static std::string store() { return folder_->file("land & sea.scree"); }
+    static void SetUpTestSuite() { land_ = std::make_unique<LandStore>("land & sea.scree"); }
+    static void TearDownTestSuite() { land_.reset(); }
+    static std::string store() { return land_->store(); }
     static ProgramRun fly(const std::string& report, const std::vector<std::string>& more = {}) {
-        std::vector<std::string> words{"fly",    store(),   "--headless", "--frames",           "12",
-                                       "--size", "200x160", "--report",   folder_->file(report)};
+        std::vector<std::string> words{"fly",    store(),   "--headless", "--frames",         "12",
+                                       "--size", "200x160", "--report",   land_->file(report)};
         words.insert(words.end(), more.begin(), more.end());
         return scree_view(words);
     }
     static ProgramRun audit(const std::string& report, const std::vector<std::string>& more = {}) {
         std::vector<std::string> words{"audit",  store(),   "--frames", "4",
-                                       "--size", "200x160", "--report", folder_->file(report)};
+                                       "--size", "200x160", "--report", land_->file(report)};
         words.insert(words.end(), more.begin(), more.end());
         return scree_view(words);
     }
-    static std::string page_of(const std::string& report) { return text_of(folder_->file(report + "/index.html")); }
+    static std::string page_of(const std::string& report) { return text_of(land_->file(report + "/index.html")); }
 
-    static std::unique_ptr<TemporaryFolder> folder_;
-    static bool can_draw_;
+    static std::unique_ptr<LandStore> land_;
 };
-std::unique_ptr<TemporaryFolder> Reporting::folder_;
-bool Reporting::can_draw_ = false;
+std::unique_ptr<LandStore> Reporting::land_;
 
 std::size_t count(const std::string& text, const std::string& part) {
     std::size_t found = 0;
@@ -68,13 +56,13 @@ std::size_t count(const std::string& text, const std::string& part) {
 }
 
 TEST_F(Reporting, AFlightIsAPageACsvAndAJsonThatSayTheSame) {
-    if (!can_draw_) GTEST_SKIP() << "needs OpenGL 4.5 by surfaceless EGL";
-    const auto report = report_of(fly("flight", {"--json", "-", "--csv", folder_->file("own.csv")}));
-    expect_only(folder_->file("flight"), {"index.html", "flight.csv", "flight.json"});
-    EXPECT_EQ(nlohmann::json::parse(text_of(folder_->file("flight/flight.json"))), report);
-    EXPECT_EQ(text_of(folder_->file("flight/flight.csv")), text_of(folder_->file("own.csv")));
+    if (!land_->can_draw()) GTEST_SKIP() << "needs OpenGL 4.5 by surfaceless EGL";
+    const auto report = report_of(fly("flight", {"--json", "-", "--csv", land_->file("own.csv")}));
+    expect_only(land_->file("flight"), {"index.html", "flight.csv", "flight.json"});
+    EXPECT_EQ(nlohmann::json::parse(text_of(land_->file("flight/flight.json"))), report);
+    EXPECT_EQ(text_of(land_->file("flight/flight.csv")), text_of(land_->file("own.csv")));
 
-    std::istringstream csv(text_of(folder_->file("own.csv")));
+    std::istringstream csv(text_of(land_->file("own.csv")));
     std::string heads, line;
     std::getline(csv, heads);
     for (const char* column : {"rss_bytes", "resident_heights_bytes", "resident_textures_bytes", "queue",
@@ -100,50 +88,49 @@ TEST_F(Reporting, AFlightIsAPageACsvAndAJsonThatSayTheSame) {
 
 TEST_F(Reporting, AnAuditIsAPageWithPicturesWhereTheyCanBeDrawn) {
     const auto report = report_of(audit("audit", {"--json", "-"}));
-    expect_only(folder_->file("audit"), {"index.html", "audit.json"});
-    EXPECT_EQ(nlohmann::json::parse(text_of(folder_->file("audit/audit.json"))), report);
+    expect_only(land_->file("audit"), {"index.html", "audit.json"});
+    EXPECT_EQ(nlohmann::json::parse(text_of(land_->file("audit/audit.json"))), report);
     const std::string page = page_of("audit");
     expect_well_formed(page);
     expect_self_contained(page);
     EXPECT_NE(page.find("The promise holds."), std::string::npos);
-    EXPECT_EQ(count(page, "src=\"data:image/png;base64,"), can_draw_ ? 4u : 0u);
-    EXPECT_EQ(count(page, "No pictures: "), can_draw_ ? 0u : 1u);
+    EXPECT_EQ(count(page, "src=\"data:image/png;base64,"), land_->can_draw() ? 4u : 0u);
+    EXPECT_EQ(count(page, "No pictures: "), land_->can_draw() ? 0u : 1u);
     // The audit itself is the same with and without a report.
     EXPECT_EQ(report, report_of(scree_view({"audit", store(), "--frames", "4", "--size", "200x160", "--json", "-"})));
 }
 
 TEST_F(Reporting, NothingButAnEarlierReportIsReplaced) {
-    std::filesystem::create_directory(folder_->file("mine"));
-    std::ofstream(folder_->file("mine/letter.txt")) << "x";
+    std::filesystem::create_directory(land_->file("mine"));
+    std::ofstream(land_->file("mine/letter.txt")) << "x";
     for (const auto& run : {fly("mine"), fly("mine", {"--force"}), audit("mine"), audit("mine", {"--force"})}) {
         EXPECT_EQ(run.exit_code, kUsage) << describe(run);
         EXPECT_NE(run.err.find("letter.txt"), std::string::npos) << run.err;
     }
-    expect_only(folder_->file("mine"), {"letter.txt"});
+    expect_only(land_->file("mine"), {"letter.txt"});
     ASSERT_EQ(audit("twice").exit_code, 0);
     EXPECT_EQ(audit("twice").exit_code, kUsage) << "without --force";
     EXPECT_EQ(audit("twice", {"--force"}).exit_code, 0);
-    expect_only(folder_->file("twice"), {"index.html", "audit.json"});
+    expect_only(land_->file("twice"), {"index.html", "audit.json"});
     EXPECT_EQ(scree_view({"audit", store(), "--force"}).exit_code, kUsage) << "--force of nothing";
     for (const auto& run :
          {fly("blocks", {"--lod", "rsg", "--cracks", "dike"}), audit("blocks", {"--lod", "rsg", "--cracks", "dike"})}) {
         EXPECT_EQ(run.exit_code, kUsage) << describe(run);
         EXPECT_NE(run.err.find("--report"), std::string::npos) << run.err;
     }
-    EXPECT_FALSE(std::filesystem::exists(folder_->file("blocks")));
+    EXPECT_FALSE(std::filesystem::exists(land_->file("blocks")));
 }
 
 TEST_F(Reporting, ABrowserShowsThePagesWithoutAComplaint) {
-    if (!can_draw_) GTEST_SKIP() << "needs OpenGL 4.5 by surfaceless EGL";
+    if (!land_->can_draw()) GTEST_SKIP() << "needs OpenGL 4.5 by surfaceless EGL";
     if (browser().empty()) GTEST_SKIP() << "needs chromium";
     ASSERT_EQ(fly("shown_flight").exit_code, 0);
     ASSERT_EQ(audit("shown_audit").exit_code, 0);
     for (const std::string name : {"shown_flight", "shown_audit"}) {
-        const std::string address = "file://" + std::filesystem::path(folder_->file(name + "/index.html")).string();
-        const auto run =
-            run_program(browser(), {"--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr",
-                                    "--user-data-dir=" + folder_->file("browser"), "--virtual-time-budget=2000",
-                                    "--dump-dom", address});
+        const std::string address = "file://" + std::filesystem::path(land_->file(name + "/index.html")).string();
+        const auto run = run_program(browser(), {"--headless", "--no-sandbox", "--disable-gpu",
+                                                 "--enable-logging=stderr", "--user-data-dir=" + land_->file("browser"),
+                                                 "--virtual-time-budget=2000", "--dump-dom", address});
         ASSERT_EQ(run.exit_code, 0) << describe(run);
         EXPECT_EQ(run.err.find("CONSOLE"), std::string::npos) << run.err;
         EXPECT_EQ(count(run.out, "<img"), name == "shown_flight" ? 8u : 4u);

@@ -5,28 +5,19 @@
 #include <fstream>
 #include <thread>
 
-#include "tests/common/test_support.h"
 #include "tests/programs/reports.h"
-#include "tests/programs/virtual_display.h"
+#include "tests/programs/window_fixture.h"
 
 namespace scree::test {
 namespace {
 
 using Json = nlohmann::json;
 
-class WindowKeys : public ::testing::Test {
+class WindowKeys : public WindowFixture {
 protected:
     void SetUp() override {
-        if (!on_path("Xvfb") || !on_path("xdotool")) GTEST_SKIP() << "needs Xvfb and xdotool";
-        ASSERT_EQ(
-            scree({"synth", "-o", folder_.file("land"), "--size", "129", "--imagery-scale", "2", "--quiet"}).exit_code,
-            0);
-        build_store_from({folder_.file("land/dem.tif"), "--imagery", folder_.file("land/ortho.tif")}, store_);
+        WindowFixture::SetUp();
         std::filesystem::create_directory(folder_.file("here"));
-        display_ = std::make_unique<VirtualDisplay>();
-        ASSERT_NE(display_->name(), "") << "Xvfb did not start";
-        options_.environment = {"DISPLAY=" + display_->name(), "WAYLAND_DISPLAY"};
-        options_.limit_s = 90;
     }
 
     // Opens the window with "here" as the working directory, does what `doing` says to xdotool, and closes it.
@@ -48,11 +39,6 @@ protected:
         return report_of(run);
     }
     std::string here(const std::string& name) const { return folder_.file("here/" + name); }
-
-    TemporaryFolder folder_;
-    std::string store_ = folder_.file("s.scree");
-    std::unique_ptr<VirtualDisplay> display_;
-    ProgramOptions options_;
 };
 
 std::vector<std::string> said(const Json& report) { return report.at("said").get<std::vector<std::string>>(); }

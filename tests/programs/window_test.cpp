@@ -3,32 +3,15 @@
 
 #include <chrono>
 
-#include "tests/common/test_support.h"
 #include "tests/programs/reports.h"
-#include "tests/programs/virtual_display.h"
+#include "tests/programs/window_fixture.h"
 
 namespace scree::test {
 namespace {
 
-class Window : public ::testing::Test {
+class Window : public WindowFixture {
 protected:
-    void SetUp() override {
-        if (!on_path("Xvfb") || !on_path("xdotool")) GTEST_SKIP() << "needs Xvfb and xdotool";
-        ASSERT_EQ(
-            scree({"synth", "-o", folder_.file("land"), "--size", "129", "--imagery-scale", "2", "--quiet"}).exit_code,
-            0);
-        build_store_from({folder_.file("land/dem.tif"), "--imagery", folder_.file("land/ortho.tif")}, store_);
-        display_ = std::make_unique<VirtualDisplay>();
-        ASSERT_NE(display_->name(), "") << "Xvfb did not start";
-        options_.environment = {"DISPLAY=" + display_->name(), "WAYLAND_DISPLAY"};
-        options_.limit_s = 60;
-    }
     void key(const char* action, const char* name) { run_program("xdotool", {action, name}, options_); }
-
-    TemporaryFolder folder_;
-    std::string store_ = folder_.file("s.scree");
-    std::unique_ptr<VirtualDisplay> display_;
-    ProgramOptions options_;
 };
 
 TEST_F(Window, ShowsTheTerrainMovesAndCloses) {
