@@ -16,8 +16,13 @@ std::int64_t thread_cpu_ns() {
 std::array<std::atomic<std::int64_t>, kStages> StageClock::nanoseconds_{};
 
 StageClock::Scope::Scope(Stage stage) : stage_(stage), start_ns_(thread_cpu_ns()) {}
-StageClock::Scope::~Scope() {
-    nanoseconds_[static_cast<std::size_t>(stage_)].fetch_add(thread_cpu_ns() - start_ns_, std::memory_order_relaxed);
+StageClock::Scope::~Scope() { change(stage_); }
+
+void StageClock::Scope::change(Stage stage) {
+    const std::int64_t now = thread_cpu_ns();
+    nanoseconds_[static_cast<std::size_t>(stage_)].fetch_add(now - start_ns_, std::memory_order_relaxed);
+    stage_ = stage;
+    start_ns_ = now;
 }
 
 double StageClock::seconds(Stage stage) {

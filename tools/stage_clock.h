@@ -18,6 +18,8 @@ public:
     public:
         explicit Scope(Stage stage);
         ~Scope();
+        /// What follows is of another stage. One clock reading.
+        void change(Stage stage);
         Scope(const Scope&) = delete;
         Scope& operator=(const Scope&) = delete;
 

@@ -94,7 +94,7 @@ void measure(const Layout& layout, const test::TemporaryFolder& folder) {
         preparing += seconds(CLOCK_PROCESS_CPUTIME_ID) - at;
         for (int again = 0; again < 2; ++again) {
             at = seconds(CLOCK_PROCESS_CPUTIME_ID);
-            if (!(*stack)->sample(0, j, points, kBandRows, out)) return;
+            if (!(*stack)->sample(0, j, points, kBandRows, out.data(), points)) return;
             const double took = seconds(CLOCK_PROCESS_CPUTIME_ID) - at;
             if (again == 0) sampling += took;
             best = std::min(best, took);

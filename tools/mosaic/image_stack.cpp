@@ -133,13 +133,15 @@ class LayerSampler {
 public:
     LayerSampler(const LayerOnGrid& layer, Scratch& scratch) : layer_(layer), scratch_(scratch) {}
 
-    Result<void> sample(const Area& area, const Canvas& out) {
+    /// As ImageStack::sample.
+    Result<bool> sample(const Area& area, const Canvas& out) {
         if (layer_.lattice) return sample_lines(area, out);
         Result<void> result;
         for_each_chunk(area, [&](const Area& chunk) {
             if (result) result = sample_points(chunk, out.part(area, chunk));
         });
-        return result;
+        if (!result) return result.error();
+        return false;
     }
 
 private:
@@ -147,7 +149,7 @@ private:
     Result<void> sample_halves(const Area& area, const Canvas& out) {
         const auto [first, second] = halves_of(area);
         for (const Area& part : {first, second})
-            if (auto ok = sample(part, out.part(area, part)); !ok) return ok;
+            if (auto sampled = sample(part, out.part(area, part)); !sampled) return sampled.error();
         return {};
     }
 
@@ -162,7 +164,7 @@ private:
                         [&](const auto& window, auto fresh) { resample_colours(window, points, rule, fresh); });
     }
 
-    Result<void> sample_lines(const Area& area, const Canvas& out) {
+    Result<bool> sample_lines(const Area& area, const Canvas& out) {
         const MappedLines lines(layer_, area);
         if (layer_.kernel == Kernel::nearest) {
             const auto columns = run_of(lines.column, layer_.layer.columns),
@@ -170,9 +172,11 @@ private:
             if (columns && rows) return copy(*columns, *rows, area, out);
         }
         const ResampleRule rule = layer_.rule_at(area.i, area.j);
-        return resample(area, window_of(layer_, area), out, [&](const auto& window, auto fresh) {
+        auto done = resample(area, window_of(layer_, area), out, [&](const auto& window, auto fresh) {
             resample_colour_lines(window, {lines.column, lines.row}, rule, fresh);
         });
+        if (!done) return done.error();
+        return false;
     }
 
     template <class Make>
@@ -216,15 +220,16 @@ private:
         return Run{first, sample, last - first + 1};
     }
 
-    Result<void> copy(const Run& columns, const Run& rows, const Area& area, const Canvas& out) const {
-        if (columns.count < area.columns || rows.count < area.rows) out.clear(area);
-        if (columns.count == 0 || rows.count == 0) return {};
+    Result<bool> copy(const Run& columns, const Run& rows, const Area& area, const Canvas& out) const {
+        const bool covered = columns.count == area.columns && rows.count == area.rows;
+        if (!covered) out.clear(area);
+        if (columns.count == 0 || rows.count == 0) return false;
         const Canvas inside{out.row(rows.first) + columns.first, out.pitch};
         const auto opaque =
             layer_.pixels->read({columns.sample, rows.sample, columns.count, rows.count}, inside.pixels, inside.pitch);
         if (!opaque) return opaque.error();
         for (std::int64_t r = 0; r < rows.count && !*opaque; ++r) make_solid(inside.row(r), columns.count);
-        return {};
+        return covered && *opaque;
     }
 
     const LayerOnGrid& layer_;
@@ -237,20 +242,21 @@ bool complete(const Area& area, const Canvas& out) {
     return true;
 }
 
-Result<void> sample_piece(const std::vector<LayerOnGrid>& layers, const Area& area, const Canvas& out,
+Result<bool> sample_piece(const std::vector<LayerOnGrid>& layers, const Area& area, const Canvas& out,
                           Scratch& scratch) {
     bool empty = true;
     for (auto layer = layers.rbegin(); layer != layers.rend(); ++layer) {
         if (layer->lattice && !window_of(*layer, area)) continue;
         if (empty) {
-            if (auto ok = LayerSampler(*layer, scratch).sample(area, out); !ok) return ok;
+            auto opaque = LayerSampler(*layer, scratch).sample(area, out);
+            if (!opaque || *opaque) return opaque;
             empty = false;
             continue;
         }
         if (complete(area, out)) break;
         scratch.below.resize(static_cast<std::size_t>(area.count()));
         const Canvas below{scratch.below.data(), area.columns};
-        if (auto ok = LayerSampler(*layer, scratch).sample(area, below); !ok) return ok;
+        if (auto sampled = LayerSampler(*layer, scratch).sample(area, below); !sampled) return sampled;
         for (std::int64_t r = 0; r < area.rows; ++r) {
             std::uint32_t* over = out.row(r);
             const std::uint32_t* under = below.row(r);
@@ -258,7 +264,7 @@ Result<void> sample_piece(const std::vector<LayerOnGrid>& layers, const Area& ar
         }
     }
     if (empty) out.clear(area);
-    return {};
+    return false;
 }
 
 // --- planning ---
@@ -460,20 +466,31 @@ void ImageStack::release_north_of(std::int64_t j) {
         impl_->layers[k].pixels->release(j, std::cref(impl_->readers[k]), impl_->images);
 }
 
-Result<void> ImageStack::sample(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
-                                std::span<std::uint32_t> out) const {
+Result<bool> ImageStack::sample(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
+                                std::uint32_t* out, std::int64_t pitch) const {
     const Area area{i, j, columns, rows};
-    const Canvas canvas{out.data(), columns};
+    const Canvas canvas{out, pitch};
     Scratch scratch;
+    bool all_opaque = true;
     for (std::int64_t top = j; top < j + rows;) {
         const std::int64_t bottom = std::min((chunk_of(top) + 1) * WarpMap::kChunk, j + rows);
         for (std::int64_t left = i; left < i + columns; left += kPieceColumns) {
             const Area piece{left, top, std::min(kPieceColumns, i + columns - left), bottom - top};
-            if (auto ok = sample_piece(impl_->layers, piece, canvas.part(area, piece), scratch); !ok) return ok;
+            const auto opaque = sample_piece(impl_->layers, piece, canvas.part(area, piece), scratch);
+            if (!opaque) return opaque;
+            all_opaque = all_opaque && *opaque;
         }
         top = bottom;
     }
-    return {};
+    return all_opaque;
+}
+
+// What is read in order, by whole rows, waits in as few of them as a decoder's band holds; what the map is asked about
+// chunk by chunk is asked for by chunks.
+std::int64_t ImageStack::rows_at_once() const {
+    const bool rolls = std::all_of(impl_->layers.begin(), impl_->layers.end(),
+                                   [](const LayerOnGrid& layer) { return layer.place == PixelPlace::memory; });
+    return rolls ? RowPixels::kBandRows : kBandRows;
 }
 
 std::int64_t ImageStack::bytes_needed(const std::vector<PlacedFile>& files, const std::vector<Layer>& layers,

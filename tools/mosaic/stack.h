@@ -125,9 +125,12 @@ public:
                          const ReadProgress& progress);
     /// Nothing in rows north of j will be asked for again: what only they needed may go. Alone, as prepare().
     void release_north_of(std::int64_t j);
-    /// Points that are prepared. Any thread. Errors: ErrorCode::io.
-    Result<void> sample(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
-                        std::span<std::uint32_t> out) const;
+    /// Points that are prepared, in rows `pitch` apart. True: all are opaque; false: nobody has looked. Any thread.
+    /// Errors: ErrorCode::io.
+    Result<bool> sample(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows, std::uint32_t* out,
+                        std::int64_t pitch) const;
+    /// Rows that are best prepared at a time.
+    std::int64_t rows_at_once() const;
 
     /// Memory that bands of 64 grid rows take, each prepared when the one before it is released: pixels that wait and
     /// decoders' bands, without what sample() takes on each thread. Files are decoded in their whole width, however

@@ -36,27 +36,36 @@ TexelGround::TexelGround(const Dataset& dataset, const Lattice& base, const Heig
 TexelGround::~TexelGround() = default;
 
 Result<void> TexelGround::finish(std::int64_t column, std::int64_t row, std::int64_t columns, std::int64_t rows,
-                                 std::uint8_t* rgba, std::int64_t row_bytes) {
+                                 std::uint8_t* rgba, std::int64_t row_bytes, bool opaque) {
     const std::int64_t side = base_.tile_cells() * texels_a_cell_;  // texels along a tile
     const std::int64_t first = column / side, end = (column + columns + side - 1) / side;
+    // Opaque texels over whole ground are what they should be.
+    const auto is_done = [&](std::int64_t x) {
+        for (std::int64_t y = row / side; opaque && y * side < row + rows; ++y) {
+            const TileId id{base_.deepest_level, x, y};
+            if (index_.refined(id) || index_.cells(id) != HeightIndex::Cells::all) return false;
+        }
+        return opaque;
+    };
+    std::vector<std::pair<std::int64_t, Tile*>> open;
     for (std::int64_t x = first; x < end; ++x) {
+        if (is_done(x)) continue;
         auto& tile = columns_[x];
         if (!tile) tile = std::make_unique<Tile>();
+        open.emplace_back(x, tile.get());
     }
-    std::vector<Tile*> tiles;
-    for (std::int64_t x = first; x < end; ++x) tiles.push_back(columns_[x].get());
     std::mutex mutex;
     Result<void> outcome;
-    tbb::parallel_for(std::int64_t{0}, end - first, [&](std::int64_t k) {
+    tbb::parallel_for(std::size_t{0}, open.size(), [&](std::size_t k) {
         const StageClock::Scope clock(Stage::filter);
-        const std::int64_t x = first + k;
+        const auto [x, tile] = open[k];
         const std::int64_t west = std::max(x * side, column), east = std::min((x + 1) * side, column + columns);
         for (std::int64_t r = row; r < row + rows;) {
             const std::int64_t south = std::min((r / side + 1) * side, row + rows);
             const Rectangle part{west, r, east - west, south - r};
             const TileId id{base_.deepest_level, x, r / side};
             std::uint8_t* corner = rgba + (r - row) * row_bytes + (west - column) * 4;
-            if (auto ok = finish_part(*tiles[static_cast<std::size_t>(k)], id, part, corner, row_bytes); !ok) {
+            if (auto ok = finish_part(*tile, id, part, corner, row_bytes); !ok) {
                 const std::lock_guard lock(mutex);
                 if (outcome) outcome = ok;
                 return;

@@ -28,9 +28,9 @@ public:
 
     /// Texels [column, column + columns) x [row, row + rows) of the level, RGBA in rows of `row_bytes`, alpha >= 128
     /// where there is imagery: afterwards opaque where there are heights, else 0. Rows in ascending order are cheapest.
-    /// One call at a time; uses all threads.
+    /// `opaque`: all of them are known to be. One call at a time; uses all threads.
     Result<void> finish(std::int64_t column, std::int64_t row, std::int64_t columns, std::int64_t rows,
-                        std::uint8_t* rgba, std::int64_t row_bytes);
+                        std::uint8_t* rgba, std::int64_t row_bytes, bool opaque = false);
     /// Does a texel of the store's deepest level have its centre in a present cell, within a texture tile that lies
     /// deeper than the leaf there? Any thread.
     Result<bool> shows(TileId texture_tile) const;

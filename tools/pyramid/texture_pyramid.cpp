@@ -17,8 +17,9 @@
 namespace scree {
 namespace {
 
-constexpr int kRowsPerPush = 16;            // 16 rows of 64 K texels are 4 MB
-constexpr std::int64_t kChunkBlocks = 512;  // blocks of a row encoded by one task: 8 K texels, about 50 us
+constexpr int kRowsPerPush = 16;              // 16 rows of 64 K texels are 4 MB
+constexpr std::int64_t kChunkTexels = 2048;   // of a row, for one task: 32 K texels of a push, about 50 us
+constexpr std::int64_t kTilesTogether = 32;   // that wait for the store packed, 30 KB each
 
 using Runs = TextureDepth::Runs;
 
@@ -38,9 +39,18 @@ struct Level {
     int capacity = 4;            // rows gathered before they are encoded
     int gathered = 0;
     std::int64_t rows_done = 0;
-    std::vector<std::uint8_t> rows;    // capacity * width RGBA
+    std::vector<std::uint32_t> rows;   // capacity * width RGBA
     std::vector<std::uint8_t> blocks;  // band_rows/4 * width/4 BC1 blocks
+
+    std::uint8_t* row(std::int64_t r) { return reinterpret_cast<std::uint8_t*>(rows.data() + r * width); }
+    const std::uint8_t* row(std::int64_t r) const {
+        return reinterpret_cast<const std::uint8_t*>(rows.data() + r * width);
+    }
 };
+
+TextureDepth::Run common_part(const TextureDepth::Run& a, const TextureDepth::Run& b) {
+    return {std::max(a.begin, b.begin), std::min(a.end, b.end)};
+}
 
 }  // namespace
 
@@ -49,8 +59,8 @@ struct TexturePyramid::Impl {
     std::int64_t size = 256;
     Extent extent;
     std::vector<Level> levels;         // deepest first
-    std::vector<std::uint8_t> second;  // the other buffer of the deepest level's rows
-    int buffer = 0;                    // the one that stands in levels.front().rows
+    std::vector<std::uint32_t> second;  // the other buffer of the deepest level's rows
+    int buffer = 0;                     // the one that stands in levels.front().rows
     std::unordered_set<TileId, TileIdHash> tiles;
     Seeds seeds;
 
@@ -70,25 +80,48 @@ struct TexturePyramid::Impl {
         return runs;
     }
 
-    void encode(Level& level) {
-        const std::int64_t block_columns = level.width / 4;
-        const std::int64_t block_rows = level.gathered / 4;
-        const std::int64_t first_row = (level.rows_done % level.band_rows) / 4;
+    // Encodes the gathered rows and halves them into `next` (null: nowhere), a stretch of columns after the other, so
+    // that they are read once.
+    void encode_and_halve(Level& level, Level* next) {
         // Refined tiles of the deepest level are made with what lies below them.
         const bool deepest = level.id == job.deepest_level;
-        for (const auto& [begin, end] :
-             pixel_runs(level, level.rows_done, deepest ? &TextureDepth::leaf_runs : &TextureDepth::runs)) {
-            const std::int64_t first = begin / 4, blocks = (end - begin) / 4;
-            const std::int64_t chunks = (blocks + kChunkBlocks - 1) / kChunkBlocks;
-            tbb::parallel_for(std::int64_t{0}, block_rows * chunks, [&](std::int64_t task) {
-                const StageClock::Scope clock(Stage::encode);
-                const std::int64_t row = task / chunks, in_run = task % chunks * kChunkBlocks;
-                const std::int64_t from = first + in_run, count = std::min(kChunkBlocks, blocks - in_run);
-                encode_bc1_row(level.rows.data() + (row * 4 * level.width + from * 4) * 4,
-                               static_cast<std::size_t>(level.width * 4), static_cast<std::size_t>(count),
-                               level.blocks.data() + ((first_row + row) * block_columns + from) * 8, job.quality);
-            });
-        }
+        const Runs encoded =
+            pixel_runs(level, level.rows_done, deepest ? &TextureDepth::leaf_runs : &TextureDepth::runs);
+        Runs halved;
+        if (next != nullptr) halved = pixel_runs(*next, level.rows_done / 2, &TextureDepth::refined_runs);
+        const std::int64_t chunks = (level.width + kChunkTexels - 1) / kChunkTexels;
+        const auto stretch = [&](std::int64_t k) {
+            const std::int64_t begin = k * kChunkTexels, end = std::min(begin + kChunkTexels, level.width);
+            StageClock::Scope clock(Stage::encode);
+            for (const TextureDepth::Run& run : encoded) encode(level, common_part(run, {begin, end}));
+            clock.change(Stage::filter);
+            for (const TextureDepth::Run& run : halved) halve(level, common_part(run, {begin / 2, end / 2}), *next);
+        };
+        if (chunks > 1)
+            tbb::parallel_for(std::int64_t{0}, chunks, stretch);
+        else
+            stretch(0);
+        if (next == nullptr || next->width == level.width / 2) return;
+        for (std::int64_t r = next->gathered; r < next->gathered + level.gathered / 2; ++r)
+            std::memset(next->row(r) + level.width / 2 * 4, 0,
+                        static_cast<std::size_t>((next->width - level.width / 2) * 4));
+    }
+
+    void encode(Level& level, const TextureDepth::Run& run) const {
+        if (run.begin >= run.end) return;
+        const std::int64_t first_row = (level.rows_done % level.band_rows) / 4;
+        for (std::int64_t r = 0; r < level.gathered / 4; ++r)
+            encode_bc1_row(level.row(4 * r) + run.begin * 4, static_cast<std::size_t>(level.width * 4),
+                           static_cast<std::size_t>((run.end - run.begin) / 4),
+                           level.blocks.data() + ((first_row + r) * level.width + run.begin) / 4 * 8, job.quality);
+    }
+
+    // `run`: of the next level's columns.
+    static void halve(const Level& level, const TextureDepth::Run& run, Level& next) {
+        if (run.begin >= run.end) return;
+        for (std::int64_t r = 0; r < level.gathered / 2; ++r)
+            downsample_rgba_row(level.row(2 * r) + run.begin * 8, level.row(2 * r + 1) + run.begin * 8,
+                                run.end - run.begin, next.row(next.gathered + r) + run.begin * 4);
     }
 
     // All gathered rows of a level are encoded and halved into the next coarser one.
@@ -96,45 +129,22 @@ struct TexturePyramid::Impl {
         Level& level = levels[index];
         if (varies(level) && level.id < job.deepest_level) {
             const std::int64_t row = (job.first_row << (level.id - job.root_level)) * size + level.rows_done;
-            if (auto ok = job.leaves(level.id, row, level.gathered, level.width, level.rows.data()); !ok) return ok;
+            if (auto ok = job.leaves(level.id, row, level.gathered, level.width, level.row(0)); !ok) return ok;
         }
-        encode(level);
+        Level* next = index + 1 < levels.size() ? &levels[index + 1] : nullptr;
+        if (next != nullptr && next->gathered == next->capacity) next->gathered = 0;
+        encode_and_halve(level, next);
         if (level.id == job.root_level) keep_seeds(level);
-        if (index + 1 < levels.size()) {
-            Level& next = levels[index + 1];
-            if (next.gathered == next.capacity) next.gathered = 0;
-            halve(level, next);
-            next.gathered += level.gathered / 2;
-        }
+        if (next != nullptr) next->gathered += level.gathered / 2;
         level.rows_done += level.gathered;
-        if (index + 1 < levels.size() && levels[index + 1].gathered == levels[index + 1].capacity)
-            return process(index + 1);
+        if (next != nullptr && next->gathered == next->capacity) return process(index + 1);
         return {};
-    }
-
-    void halve(const Level& level, Level& next) {
-        const std::int64_t pairs = level.gathered / 2;
-        std::uint8_t* out = next.rows.data() + next.gathered * next.width * 4;
-        const Runs runs = pixel_runs(next, level.rows_done / 2, &TextureDepth::refined_runs);
-        tbb::parallel_for(std::int64_t{0}, pairs, [&](std::int64_t p) {
-            const StageClock::Scope clock(Stage::filter);
-            const std::uint8_t* upper = level.rows.data() + 2 * p * level.width * 4;
-            for (const auto& [begin, end] : runs) {
-                const std::int64_t last = std::min(end, level.width / 2);
-                if (last > begin)
-                    downsample_rgba_row(upper + begin * 8, upper + (level.width + 2 * begin) * 4, last - begin,
-                                        out + (p * next.width + begin) * 4);
-            }
-            std::memset(out + p * next.width * 4 + level.width / 2 * 4, 0,
-                        static_cast<std::size_t>((next.width - level.width / 2) * 4));
-        });
     }
 
     void keep_seeds(const Level& level) {
         seeds.columns = level.width;
         seeds.rows += level.gathered;
-        seeds.rgba.insert(seeds.rgba.end(), level.rows.begin(),
-                          level.rows.begin() + static_cast<std::ptrdiff_t>(level.gathered * level.width * 4));
+        seeds.rgba.insert(seeds.rgba.end(), level.row(0), level.row(level.gathered));
     }
 
     std::uint8_t child_mask(TileId id) const {
@@ -170,7 +180,7 @@ struct TexturePyramid::Impl {
         const Level& level = level_of(level_id - (log2 - 2));
         std::array<std::uint8_t, 16> two{};
         std::array<std::uint8_t, 4> one{};
-        const std::uint8_t* pixels = level.rows.data() + (level.gathered - 4) * level.width * 4 + x * 16;
+        const std::uint8_t* pixels = level.row(level.gathered - 4) + x * 16;
         for (int r = 0; r < 2; ++r)
             downsample_rgba_row(pixels + 2 * r * level.width * 4, pixels + (2 * r + 1) * level.width * 4, 2,
                                 two.data() + 8 * r);
@@ -210,33 +220,28 @@ struct TexturePyramid::Impl {
 
     Result<void> emit_band(Level& level, std::int64_t y) {
         const std::int64_t columns = level.width / size;
+        for (std::int64_t x = 0; x < columns; x += kTilesTogether)
+            if (auto ok = emit_tiles(level, y, x, std::min(x + kTilesTogether, columns)); !ok) return ok;
+        return {};
+    }
+
+    Result<void> emit_tiles(Level& level, std::int64_t y, std::int64_t begin, std::int64_t end) {
         const int down = level.id - job.root_level;
         const TileId corner{level.id, job.first_column << down, (job.first_row << down) + y};
-        std::vector<std::vector<std::uint8_t>> payloads(static_cast<std::size_t>(columns));
+        std::vector<std::vector<std::uint8_t>> payloads(static_cast<std::size_t>(end - begin));
         std::mutex mutex;
         Result<void> outcome;
-        tbb::parallel_for(std::int64_t{0}, columns, [&](std::int64_t x) {
-            const TileId id{level.id, corner.x + x, corner.y};
-            const bool may_show = level.id > job.shared_levels, stored = job.stored(id);
-            if ((!stored && !may_show) || !exists(id) || is_made_below(id)) return;
-            const std::uint8_t children = child_mask(id);
-            const bool above_deepest = job.depth != nullptr && level.id < job.depth->deepest();
-            const StageClock::Scope clock(Stage::encode);
-            if (!stored && children == 0 && above_deepest) {
-                const auto shows = job.shows(id);
-                const std::lock_guard lock(mutex);
-                if (!shows) outcome = shows.error();
-                if (!shows || !*shows) return;
-            }
-            TextureTile tile = assemble(level.id, x, y);
-            if (!stored && children == 0 && !above_deepest && !any_opaque(tile, job.texture_size_log2)) return;
-            tile.child_mask = children;
-            payloads[static_cast<std::size_t>(x)] =
-                encode_texture_tile(tile, job.texture_size_log2, TextureCodec::split);
+        tbb::parallel_for(begin, end, [&](std::int64_t x) {
+            auto payload = packed_tile({level.id, corner.x + x, corner.y}, x, y);
+            const std::lock_guard lock(mutex);
+            if (payload)
+                payloads[static_cast<std::size_t>(x - begin)] = std::move(*payload);
+            else
+                outcome = payload.error();
         });
         if (!outcome) return outcome;
-        for (std::int64_t x = 0; x < columns; ++x) {
-            auto& payload = payloads[static_cast<std::size_t>(x)];
+        for (std::int64_t x = begin; x < end; ++x) {
+            auto& payload = payloads[static_cast<std::size_t>(x - begin)];
             const TileId id{level.id, corner.x + x, corner.y};
             if (is_made_below(id) && job.made_below(id)) tiles.insert(id);
             if (payload.empty()) continue;
@@ -244,6 +249,25 @@ struct TexturePyramid::Impl {
             if (auto ok = job.sink(id, std::move(payload)); !ok) return ok;
         }
         return {};
+    }
+
+    // Empty where the tile is not stored.
+    Result<std::vector<std::uint8_t>> packed_tile(TileId id, std::int64_t x, std::int64_t y) {
+        const std::vector<std::uint8_t> nothing;
+        const bool may_show = id.level > job.shared_levels, stored = job.stored(id);
+        if ((!stored && !may_show) || !exists(id) || is_made_below(id)) return nothing;
+        const std::uint8_t children = child_mask(id);
+        const bool above_deepest = job.depth != nullptr && id.level < job.depth->deepest();
+        const StageClock::Scope clock(Stage::encode);
+        if (!stored && children == 0 && above_deepest) {
+            const auto shows = job.shows(id);
+            if (!shows) return shows.error();
+            if (!*shows) return nothing;
+        }
+        TextureTile tile = assemble(id.level, x, y);
+        if (!stored && children == 0 && !above_deepest && !any_opaque(tile, job.texture_size_log2)) return nothing;
+        tile.child_mask = children;
+        return encode_texture_tile(tile, job.texture_size_log2, TextureCodec::split);
     }
 };
 
@@ -267,13 +291,16 @@ TexturePyramid::TexturePyramid(TexturePyramidJob job) : impl_(std::make_unique<I
         level.width = width;
         level.band_rows = id >= job.root_level ? m.size : m.size >> (job.root_level - id);
         level.capacity = capacity;
-        level.rows.resize(static_cast<std::size_t>(capacity * width * 4));
+        level.rows.resize(static_cast<std::size_t>(capacity * width));
         level.blocks.resize(static_cast<std::size_t>(level.band_rows / 4 * (width / 4) * 8));
         m.levels.push_back(std::move(level));
         width = id > job.root_level ? round_up(width / 2, m.size) : width / 2;
         capacity = std::max(4, capacity / 2);
     }
     m.second.resize(m.levels.front().rows.size());
+    // Growing step by step they would take three times as much.
+    const Level& root = m.levels[static_cast<std::size_t>(down)];
+    m.seeds.rgba.reserve(static_cast<std::size_t>(round_up(m.extent.rows >> down, m.size) * root.width * 4));
     m.job = std::move(job);
 }
 
@@ -282,7 +309,8 @@ TexturePyramid::~TexturePyramid() = default;
 TexturePyramid::Extent TexturePyramid::extent() const { return impl_->extent; }
 int TexturePyramid::rows_per_push() const { return impl_->levels.front().capacity; }
 std::uint8_t* TexturePyramid::rows(int buffer) {
-    return buffer == impl_->buffer ? impl_->levels.front().rows.data() : impl_->second.data();
+    auto& words = buffer == impl_->buffer ? impl_->levels.front().rows : impl_->second;
+    return reinterpret_cast<std::uint8_t*>(words.data());
 }
 
 Result<void> TexturePyramid::push(int buffer) {
@@ -302,7 +330,7 @@ Result<std::int64_t> TexturePyramid::finish() {
         Level& level = impl_->levels[index];
         while ((level.rows_done + (level.gathered == level.capacity ? 0 : level.gathered)) % level.band_rows != 0) {
             if (level.gathered == level.capacity) level.gathered = 0;
-            std::memset(level.rows.data() + level.gathered * level.width * 4, 0,
+            std::memset(level.row(level.gathered), 0,
                         static_cast<std::size_t>((level.capacity - level.gathered) * level.width * 4));
             level.gathered = level.capacity;
             if (auto ok = impl_->process(index); !ok) return ok.error();

@@ -61,7 +61,8 @@ public:
     Extent extent() const;
     /// Rows a push takes; divides the tile size.
     int rows_per_push() const;
-    /// Two buffers for rows_per_push() rows of extent().columns * 4 bytes. Fill one while the other is pushed.
+    /// Two buffers for rows_per_push() rows of extent().columns * 4 bytes; the bytes of words. Fill one while the other
+    /// is pushed.
     std::uint8_t* rows(int buffer);
     Result<void> push(int buffer);
     /// After all rows: completes the coarse levels.

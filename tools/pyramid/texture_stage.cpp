@@ -17,8 +17,7 @@
 namespace scree {
 namespace {
 
-constexpr std::int64_t kSampledColumns = 512;  // of a task
-constexpr std::int64_t kPreparedRows = 64;
+constexpr std::int64_t kSampledColumns = 2048;  // of a task
 constexpr int kLeastDeepTexelsLog2 = 15;
 
 Error interrupted() { return {ErrorCode::interrupted, "stopped"}; }
@@ -86,13 +85,17 @@ public:
             if (auto ok = prepare(*imagery, level, row, first, columns); !ok) return ok;
         for (const auto& [begin, end] : leaves) {
             const Part part{begin, row, end - begin, rows, rgba + (begin - first) * 4, columns * 4};
+            bool opaque = false;
             if (imagery != nullptr) {
-                if (auto ok = sample(*imagery, part); !ok) return ok;
+                auto sampled = sample(*imagery, part);
+                if (!sampled) return sampled.error();
+                opaque = *sampled;
             } else {
                 for (std::int64_t r = 0; r < rows; ++r)
                     std::memset(part.rgba + r * part.row_bytes, 0, static_cast<std::size_t>(part.columns * 4));
             }
-            auto ok = stage_.ground(level).finish(part.column, row, part.columns, rows, part.rgba, part.row_bytes);
+            auto ok =
+                stage_.ground(level).finish(part.column, row, part.columns, rows, part.rgba, part.row_bytes, opaque);
             if (!ok) return ok;
         }
         return {};
@@ -125,7 +128,7 @@ private:
         if (row < prepared_end) return {};
         imagery.release_north_of(row);
         const std::int64_t piece_end = (piece_.first_row + piece_.rows) << (level - piece_.root_level);
-        const std::int64_t end = std::min(row + kPreparedRows, piece_end * size_);
+        const std::int64_t end = std::min(row + imagery.rows_at_once(), piece_end * size_);
         const std::atomic<bool>* stop = stage_.job_.stop;
         const auto go_on = [&](std::int64_t) { return stop == nullptr || !*stop; };
         for (std::int64_t top = row; top < end;) {
@@ -139,23 +142,20 @@ private:
         return {};
     }
 
-    Result<void> sample(const ImageStack& imagery, const Part& part) {
+    // True: all texels are opaque.
+    Result<bool> sample(const ImageStack& imagery, const Part& part) {
         std::mutex mutex;
-        Result<void> outcome;
+        Result<bool> outcome = true;
         const std::int64_t parts = (part.columns + kSampledColumns - 1) / kSampledColumns;
         tbb::parallel_for(std::int64_t{0}, parts, [&](std::int64_t k) {
             const StageClock::Scope clock(Stage::warp);
             const std::int64_t first = k * kSampledColumns, count = std::min(kSampledColumns, part.columns - first);
-            thread_local std::vector<std::uint32_t> values;
-            values.resize(static_cast<std::size_t>(count * part.rows));
-            if (auto ok = imagery.sample(part.column + first, part.row, count, part.rows, values); !ok) {
-                const std::lock_guard lock(mutex);
-                if (outcome) outcome = ok;
-                return;
-            }
-            for (std::int64_t r = 0; r < part.rows; ++r)
-                std::memcpy(part.rgba + r * part.row_bytes + first * 4, values.data() + r * count,
-                            static_cast<std::size_t>(count * 4));
+            auto* out = reinterpret_cast<std::uint32_t*>(part.rgba) + first;  // words (TexturePyramid::rows)
+            const auto opaque =
+                imagery.sample(part.column + first, part.row, count, part.rows, out, part.row_bytes / 4);
+            if (opaque && *opaque) return;
+            const std::lock_guard lock(mutex);
+            if (outcome) outcome = opaque;
         });
         return outcome;
     }

@@ -164,9 +164,15 @@ protected:
         ASSERT_TRUE(layers.ok());
         scene.layers = std::move(*layers);
     }
+    int said_opaque_ = 0;
     Pixels sample(const ImageStack& stack, const Area& area) {
         Pixels out(area.count(), 0xDEADBEEF);
-        EXPECT_TRUE(stack.sample(area.i, area.j, area.columns, area.rows, out).ok());
+        const auto opaque = stack.sample(area.i, area.j, area.columns, area.rows, out.data(), area.columns);
+        EXPECT_TRUE(opaque.ok());
+        if (opaque && *opaque) {
+            ++said_opaque_;
+            EXPECT_TRUE(std::all_of(out.begin(), out.end(), [](std::uint32_t v) { return v >> 24 == 255; }));
+        }
         return out;
     }
     static Pixels part_of(const Pixels& all, const Area& whole, const Area& part) {
