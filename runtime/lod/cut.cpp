@@ -175,11 +175,42 @@ std::int32_t Cut::add_node(TileId id, const Known& known, std::int32_t parent) {
     node.leaf = known.leaf;
     node.texture_ends = known.texture_ends;
     node.textured = known.textured;
-    node.parent = parent;
     judge(node, above == nullptr ? kInfinity : above->finest_error_m);
-    if (above != nullptr) node.level = std::min(node.level, above->level);
+    node.judged = node.level;
+    return enter(parent);
+}
+
+// What the other cut has measured and judged, as it was before anything came of it.
+std::int32_t Cut::add_twin(std::int32_t twin, std::int32_t parent) {
+    if (twin < 0) return -1;
+    CutNode& node = nodes_.emplace_back(beside_->nodes_[static_cast<std::size_t>(twin)]);
+    node.twin = twin;
+    node.split = node.queued = node.refused = false;
+    node.level = node.judged;
+    node.floor = level_of(minimum_exponent(node));
+    node.neighbours = node.children = {-1, -1, -1, -1};
+    node.grows_from_s = -kInfinity;
+    node.priority = 0;
+    return enter(parent);
+}
+
+// The last node, under its parent.
+std::int32_t Cut::enter(std::int32_t parent) {
+    CutNode& node = nodes_.back();
+    node.parent = parent;
+    if (parent >= 0) node.level = std::min(node.level, nodes_[static_cast<std::size_t>(parent)].level);
     ++pages_;
     return static_cast<std::int32_t>(nodes_.size()) - 1;
+}
+
+// The parent stays where it is in memory.
+std::int32_t Cut::add_child(std::int32_t index, int quadrant) {
+    const CutNode& parent = nodes_[static_cast<std::size_t>(index)];
+    const auto q = static_cast<std::size_t>(quadrant);
+    if (parent.twin >= 0)
+        if (const CutNode& twin = beside_->nodes_[static_cast<std::size_t>(parent.twin)]; twin.split)
+            return add_twin(twin.children[q], index);
+    return add_node(child_of(parent.id, quadrant), known_child(parent, q), index);
 }
 
 Cut::Known Cut::known_root(std::size_t root) const {
@@ -209,7 +240,7 @@ void Cut::add_roots() {
         if (slots[k] < 0) continue;  // a root without any present cell is not stored
         const TileId id{0, static_cast<std::int64_t>(k) % lattice_.root_columns,
                         static_cast<std::int64_t>(k) / lattice_.root_columns};
-        roots_[k] = add_node(id, known_root(k), -1);
+        roots_[k] = beside_ != nullptr ? add_twin(beside_->roots_[k], -1) : add_node(id, known_root(k), -1);
         if (roots_[k] >= 0) --pages_;  // pinned: counted whether in view or not
     }
     for (const std::int32_t root : roots_) {
@@ -301,7 +332,7 @@ bool Cut::try_split(std::int32_t index) {
     for (int q = 0; q < 4; ++q) {
         const auto k = static_cast<std::size_t>(q);
         if ((header.child_mask >> q & 1) == 0) continue;
-        children[k] = add_node(child_of(parent.id, q), known_child(parent, k), index);
+        children[k] = add_child(index, q);
         if (children[k] < 0) continue;
         const CutNode& child = nodes_[static_cast<std::size_t>(children[k])];
         if (child.slot >= 0) continue;
@@ -372,8 +403,10 @@ void Cut::consider_from(std::size_t first) {
     }
 }
 
-bool Cut::refine(std::span<const LodView> views, const CutSettings& settings, const Residency& residency) {
+bool Cut::refine(std::span<const LodView> views, const CutSettings& settings, const Residency& residency,
+                 const Cut* beside) {
     assert(views.size() <= kMaxViews);
+    beside_ = beside;
     views_ = views;
     settings_ = settings;
     residency_ = &residency;
