@@ -159,13 +159,23 @@ private:
         std::int32_t slot = kNotResident, texture_slot = kNotResident;
         bool leaf = false, texture_ends = false, textured = true;
     };
+    /// What the views see of the four quadrants of a page, whether they exist or not.
+    struct FourMeasured {
+        std::array<std::uint32_t, 4> seen_by{}, inside{};
+        std::array<double, 4> metres_per_px{}, texel_per_px{};
+        std::array<double, 2> west_m{}, north_m{};  ///< by column, by row
+    };
     Known known_root(std::size_t root) const;
     Known known_child(const CutNode& parent, std::size_t quadrant) const;
     std::int32_t add_node(TileId id, const Known& known, std::int32_t parent);
     std::int32_t add_twin(std::int32_t twin, std::int32_t parent);
-    std::int32_t add_child(std::int32_t parent, int quadrant);
+    std::int32_t add_measured(std::int32_t parent, std::size_t quadrant, const FourMeasured& measured);
+    void add_children(std::int32_t parent, const HeightTileHeader& header, std::array<std::int32_t, 4>& children);
+    void learn(CutNode& node, const Known& known) const;
     std::int32_t enter(std::int32_t parent);
+    void fetch_ahead(const CutNode& node) const;
     void measure(CutNode& node, std::uint32_t candidates, std::uint32_t inside) const;
+    void measure_children(const CutNode& parent, const HeightTileHeader& header, FourMeasured& out) const;
     void judge(CutNode& node, double parent_error_m) const;
     void judge_by_corrections(CutNode& node) const;
     void judge_texture(CutNode& node) const;
