@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "runtime/view/four_boxes.h"
+
 namespace scree {
 namespace {
 
@@ -93,6 +95,42 @@ void Cut::measure(CutNode& node, std::uint32_t candidates, std::uint32_t inside)
     }
 }
 
+// The same of four children at once, as box_of and measure have it.
+void Cut::measure_children(const CutNode& parent, const HeightTileHeader& header, FourMeasured& out) const {
+    const std::int64_t extent = lattice_.tile_extent(parent.id.level + 1);
+    const double side = side_m_[static_cast<std::size_t>(parent.id.level + 1)];
+    FourBoxes flat;
+    for (std::size_t k = 0; k < 2; ++k) {
+        const auto step = static_cast<std::int64_t>(k);
+        out.west_m[k] = lattice_.x_m(static_cast<double>((2 * parent.id.x + step) * extent));
+        out.north_m[k] = lattice_.y_m(static_cast<double>((2 * parent.id.y + step) * extent));
+    }
+    for (std::size_t q = 0; q < 4; ++q) {
+        flat.west[q] = out.west_m[q & 1];
+        flat.north[q] = out.north_m[q >> 1];
+        flat.east[q] = std::min(flat.west[q] + side, east_m_);
+        flat.south[q] = std::max(flat.north[q] - side, south_m_);
+        flat.low[q] = dataset_.height_m(header.children[q].min_n);
+        flat.high[q] = dataset_.height_m(header.children[q].max_n);
+    }
+    out.metres_per_px.fill(kInfinity);
+    out.texel_per_px.fill(kInfinity);
+    for (std::size_t v = 0; v < views_.size(); ++v) {
+        const std::uint32_t bit = 1u << v;
+        if ((parent.seen_by & bit) == 0) continue;
+        const LodView& view = views_[v];
+        const FourSeen seen =
+            see_four(view.frustum, flat, settings_.half_curvature, view.near_m, (parent.inside & bit) != 0);
+        for (std::size_t q = 0; q < 4; ++q) {
+            if ((seen.none >> q & 1) != 0) continue;
+            out.seen_by[q] |= bit;
+            if ((seen.all >> q & 1) != 0) out.inside[q] |= bit;
+            out.metres_per_px[q] = std::min(out.metres_per_px[q], seen.distance_m[q] / view.error_px);
+            out.texel_per_px[q] = std::min(out.texel_per_px[q], seen.distance_m[q] / view.focal_px);
+        }
+    }
+}
+
 double Cut::error_m(const CutNode& node, int geomip) const {
     return static_cast<double>(node.bounds->error_n[static_cast<std::size_t>(geomip)]) * dataset_.height_quantum_m +
            curving_m_[static_cast<std::size_t>(minimum_exponent(node) + geomip)];
@@ -169,17 +207,91 @@ std::int32_t Cut::add_node(TileId id, const Known& known, std::int32_t parent) {
         nodes_.pop_back();
         return -1;
     }
-    node.page_level = static_cast<std::int8_t>(id.level);
+    learn(node, known);
+    judge(node, above == nullptr ? kInfinity : above->finest_error_m);
+    node.judged = node.level;
+    return enter(parent);
+}
+
+void Cut::learn(CutNode& node, const Known& known) const {
+    node.page_level = static_cast<std::int8_t>(node.id.level);
+    node.bounds = known.bounds;
     node.slot = known.slot;
     node.texture_slot = known.texture_slot;
     node.leaf = known.leaf;
     node.texture_ends = known.texture_ends;
     node.textured = known.textured;
+}
+
+std::int32_t Cut::add_measured(std::int32_t index, std::size_t q, const FourMeasured& measured) {
+    if (measured.seen_by[q] == 0) return -1;
+    CutNode& node = nodes_.emplace_back();
+    const CutNode& parent = nodes_[static_cast<std::size_t>(index)];
+    node.id = child_of(parent.id, static_cast<int>(q));
+    learn(node, known_child(parent, q));
+    node.west_m = measured.west_m[q & 1];
+    node.north_m = measured.north_m[q >> 1];
+    node.seen_by = measured.seen_by[q];
+    node.inside = measured.inside[q];
+    node.metres_per_px = measured.metres_per_px[q];
+    node.texel_per_px = measured.texel_per_px[q];
+    judge(node, parent.finest_error_m);
+    node.judged = node.level;
+    fetch_ahead(node);
+    return enter(index);
+}
+
+// What its splitting will read, a few pages from now.
+void Cut::fetch_ahead(const CutNode& node) const {
+    if (node.slot < 0 || (!node.wants_geometry && !(node.texture_need > 1))) return;
+    const auto slot = static_cast<std::size_t>(node.slot);
+    const auto* header = reinterpret_cast<const char*>(&residency_->heights.headers[slot]);
+    for (std::size_t at = 0; at < sizeof(HeightTileHeader); at += 64) __builtin_prefetch(header + at);
+    __builtin_prefetch(&residency_->heights.children[slot]);
+    if (node.texture_slot >= 0)
+        __builtin_prefetch(&residency_->textures.children[static_cast<std::size_t>(node.texture_slot)]);
+}
+
+// What the other cut has measured and judged, as it was before anything came of it.
+std::int32_t Cut::add_twin(std::int32_t twin, std::int32_t parent) {
+    if (twin < 0) return -1;
+    CutNode& node = nodes_.emplace_back(beside_->nodes_[static_cast<std::size_t>(twin)]);
+    node.twin = twin;
+    node.split = node.queued = node.refused = false;
+    node.level = node.judged;
+    node.floor = level_of(minimum_exponent(node));
+    node.neighbours = node.children = {-1, -1, -1, -1};
+    node.grows_from_s = -kInfinity;
+    node.priority = 0;
+    return enter(parent);
+}
+
+// The last node, under its parent.
+std::int32_t Cut::enter(std::int32_t parent) {
+    CutNode& node = nodes_.back();
     node.parent = parent;
-    judge(node, above == nullptr ? kInfinity : above->finest_error_m);
-    if (above != nullptr) node.level = std::min(node.level, above->level);
+    if (parent >= 0) node.level = std::min(node.level, nodes_[static_cast<std::size_t>(parent)].level);
     ++pages_;
     return static_cast<std::int32_t>(nodes_.size()) - 1;
+}
+
+// The nodes must have room for them, so that the parent stays where it is.
+void Cut::add_children(std::int32_t index, const HeightTileHeader& header, std::array<std::int32_t, 4>& children) {
+    const CutNode& parent = nodes_[static_cast<std::size_t>(index)];
+    const CutNode* twin = parent.twin >= 0 ? &beside_->nodes_[static_cast<std::size_t>(parent.twin)] : nullptr;
+    if (twin != nullptr && !twin->split) twin = nullptr;
+    const bool one_by_one = settings_.metric == ErrorMetric::deboer;
+    FourMeasured measured;
+    if (twin == nullptr && !one_by_one) measure_children(parent, header, measured);
+    for (std::size_t q = 0; q < 4; ++q) {
+        if ((header.child_mask >> q & 1) == 0) continue;
+        if (twin != nullptr)
+            children[q] = add_twin(twin->children[q], index);
+        else if (one_by_one)
+            children[q] = add_node(child_of(parent.id, static_cast<int>(q)), known_child(parent, q), index);
+        else
+            children[q] = add_measured(index, q, measured);
+    }
 }
 
 Cut::Known Cut::known_root(std::size_t root) const {
@@ -209,7 +321,7 @@ void Cut::add_roots() {
         if (slots[k] < 0) continue;  // a root without any present cell is not stored
         const TileId id{0, static_cast<std::int64_t>(k) % lattice_.root_columns,
                         static_cast<std::int64_t>(k) / lattice_.root_columns};
-        roots_[k] = add_node(id, known_root(k), -1);
+        roots_[k] = beside_ != nullptr ? add_twin(beside_->roots_[k], -1) : add_node(id, known_root(k), -1);
         if (roots_[k] >= 0) --pages_;  // pinned: counted whether in view or not
     }
     for (const std::int32_t root : roots_) {
@@ -298,14 +410,10 @@ bool Cut::try_split(std::int32_t index) {
     const std::size_t first = nodes_.size();
     const std::int64_t pages_before = pages_;
     std::array<std::int32_t, 4> children{-1, -1, -1, -1};
-    for (int q = 0; q < 4; ++q) {
-        const auto k = static_cast<std::size_t>(q);
-        if ((header.child_mask >> q & 1) == 0) continue;
-        children[k] = add_node(child_of(parent.id, q), known_child(parent, k), index);
-        if (children[k] < 0) continue;
-        const CutNode& child = nodes_[static_cast<std::size_t>(children[k])];
-        if (child.slot >= 0) continue;
-        if (settings_.only_resident || child.slot == kUnavailable) {
+    add_children(index, header, children);
+    for (const std::int32_t k : children) {
+        if (k < 0 || nodes_[static_cast<std::size_t>(k)].slot >= 0) continue;
+        if (settings_.only_resident || nodes_[static_cast<std::size_t>(k)].slot == kUnavailable) {
             nodes_.resize(first);
             pages_ = pages_before;
             return false;
@@ -372,8 +480,10 @@ void Cut::consider_from(std::size_t first) {
     }
 }
 
-bool Cut::refine(std::span<const LodView> views, const CutSettings& settings, const Residency& residency) {
+bool Cut::refine(std::span<const LodView> views, const CutSettings& settings, const Residency& residency,
+                 const Cut* beside) {
     assert(views.size() <= kMaxViews);
+    beside_ = beside;
     views_ = views;
     settings_ = settings;
     residency_ = &residency;

@@ -68,6 +68,8 @@ struct alignas(64) CutNode {
 
     std::int32_t texture_slot = kNotResident;  ///< of the texture tile of the same address
     std::uint32_t inside = 0;                  ///< views that see all of its box
+    Level judged = 0;                          ///< the coarsest level within the tolerances: what `level` falls from
+    std::int32_t twin = -1;                    ///< the same page in the cut that this one was made beside, or -1
     TileId id;
     const HeightBounds* bounds = nullptr;
     double metres_per_px = 0;        ///< least over the views that see it of d / (f K): error allowed for one pixel; of
@@ -110,8 +112,10 @@ class Cut {
 public:
     explicit Cut(const Dataset& dataset);
 
-    /// Makes the cut anew. False: more than max_pages would be needed; the cut is then unusable.
-    bool refine(std::span<const LodView> views, const CutSettings& settings, const Residency& residency);
+    /// Makes the cut anew. False: more than max_pages would be needed; the cut is then unusable. `beside`: one just made
+    /// of the same views and residency for the same tolerances: what it has measured is not measured again.
+    bool refine(std::span<const LodView> views, const CutSettings& settings, const Residency& residency,
+                const Cut* beside = nullptr);
 
     /// Parents come before their children.
     const std::vector<CutNode>& nodes() const { return nodes_; }
@@ -155,10 +159,23 @@ private:
         std::int32_t slot = kNotResident, texture_slot = kNotResident;
         bool leaf = false, texture_ends = false, textured = true;
     };
+    /// What the views see of the four quadrants of a page, whether they exist or not.
+    struct FourMeasured {
+        std::array<std::uint32_t, 4> seen_by{}, inside{};
+        std::array<double, 4> metres_per_px{}, texel_per_px{};
+        std::array<double, 2> west_m{}, north_m{};  ///< by column, by row
+    };
     Known known_root(std::size_t root) const;
     Known known_child(const CutNode& parent, std::size_t quadrant) const;
     std::int32_t add_node(TileId id, const Known& known, std::int32_t parent);
+    std::int32_t add_twin(std::int32_t twin, std::int32_t parent);
+    std::int32_t add_measured(std::int32_t parent, std::size_t quadrant, const FourMeasured& measured);
+    void add_children(std::int32_t parent, const HeightTileHeader& header, std::array<std::int32_t, 4>& children);
+    void learn(CutNode& node, const Known& known) const;
+    std::int32_t enter(std::int32_t parent);
+    void fetch_ahead(const CutNode& node) const;
     void measure(CutNode& node, std::uint32_t candidates, std::uint32_t inside) const;
+    void measure_children(const CutNode& parent, const HeightTileHeader& header, FourMeasured& out) const;
     void judge(CutNode& node, double parent_error_m) const;
     void judge_by_corrections(CutNode& node) const;
     void judge_texture(CutNode& node) const;
@@ -193,6 +210,7 @@ private:
     std::span<const LodView> views_;
     CutSettings settings_;
     const Residency* residency_ = nullptr;
+    const Cut* beside_ = nullptr;
     std::vector<CutNode> nodes_;
     std::vector<std::int32_t> roots_;
     std::vector<std::int32_t> queue_;

@@ -124,13 +124,17 @@ struct Selector::Impl {
         try_plan(s, residency, geometry, texture);
         for (const CutNode& node : plan.nodes())
             if (node.split) result.standing_heights.push_back(node.slot);
-        if (pages_fit_ && residency.has_textures) textures.hand_over(plan, result.standing_textures, result.requests);
+        missing_.assign(plan.nodes().size(), false);
+        if (pages_fit_ && residency.has_textures)
+            textures.hand_over(plan, result.standing_textures, result.requests, missing_);
         result.requests.clear();
     }
 
     void request_missing(const SelectionSettings& settings, const Residency& residency) {
         double youngest_s = -std::numeric_limits<double>::infinity();
-        for (const CutNode& node : plan.nodes()) {
+        missing_.assign(plan.nodes().size(), false);
+        for (std::size_t k = 0; k < plan.nodes().size(); ++k) {
+            const CutNode& node = plan.nodes()[k];
             if (!node.visible()) continue;
             if (node.slot >= 0) {
                 result.planned_heights.push_back(node.slot);
@@ -138,11 +142,12 @@ struct Selector::Impl {
             } else if (node.slot == kNotResident) {
                 result.complete = false;
                 result.requests.push_back({TileKind::height, node.id, node.priority});
+                missing_[k] = true;
             }
         }
         const bool heights_complete = result.complete;
         if (residency.has_textures) {
-            textures.hand_over(plan, result.planned_textures, result.requests);
+            textures.hand_over(plan, result.planned_textures, result.requests, missing_);
             result.complete = result.requests.empty();
         }
         std::sort(result.requests.begin(), result.requests.end(), [](const TileRequest& a, const TileRequest& b) {
@@ -166,14 +171,19 @@ struct Selector::Impl {
             }
     }
 
-    // The addresses under or at which something is asked for: a tile drawn there stands in for it.
+    // The pages of the plan at or under which something is asked for: a tile drawn there stands in for it. What is drawn
+    // and no page of the plan has nothing to wait for.
     void note_missing() {
-        over_missing_.clear();
-        for (const TileRequest& request : result.requests)
-            for (int level = 0; level <= request.id.level; ++level)
-                over_missing_.push_back(ancestor_at(request.id, level));
-        std::sort(over_missing_.begin(), over_missing_.end());
-        over_missing_.erase(std::unique(over_missing_.begin(), over_missing_.end()), over_missing_.end());
+        if (result.complete) return;
+        for (std::size_t k = plan.nodes().size(); k-- > 0;)
+            if (const std::int32_t parent = plan.nodes()[k].parent; parent >= 0 && missing_[k])
+                missing_[static_cast<std::size_t>(parent)] = true;
+    }
+
+    bool stands_in(const Cut& cut, std::size_t k) const {
+        if (result.complete) return false;
+        const std::int32_t page = &cut == &plan ? static_cast<std::int32_t>(k) : cut.nodes()[k].twin;
+        return page >= 0 && missing_[static_cast<std::size_t>(page)];
     }
 
     void emit(Cut& cut, const SelectionSettings& settings) {
@@ -199,7 +209,7 @@ struct Selector::Impl {
             item.morph = drawn.morph;
             item.edge_morph = drawn.edge_morph;
             const bool sharp = textures.place(cut, static_cast<std::int32_t>(k), settings.growth_s, item);
-            if (!sharp || std::binary_search(over_missing_.begin(), over_missing_.end(), node.id)) ++result.stand_ins;
+            if (!sharp || stands_in(cut, k)) ++result.stand_ins;
             ++result.nodes;
             const double bound_px = cut.drawn_error_m(node, drawn) / cut.certain_metres_per_px(node);
             item.bound_px = static_cast<float>(bound_px);
@@ -270,6 +280,7 @@ struct Selector::Impl {
     void select(const SelectionSettings& settings, const Residency& residency) {
         make_plan(settings, residency);
         request_missing(settings, residency);
+        if (settings.plan_only) return;
         note_missing();
         if (!use_standing_) {
             // What is planned is what is drawn; textures that are still to come are stood in for.
@@ -284,7 +295,7 @@ struct Selector::Impl {
         cut.only_resident = true;
         cut.growth_s = settings.growth_s;
         cut.moved_m = settings.moved_m;
-        standing.refine(views, cut, residency);
+        standing.refine(views, cut, residency, &plan);
         result.refine_steps += standing.steps();
         for (const CutNode& node : standing.nodes())
             if (node.visible()) result.standing_heights.push_back(node.slot);
@@ -294,7 +305,7 @@ struct Selector::Impl {
     }
 
 private:
-    std::vector<TileId> over_missing_;  // sorted
+    std::vector<bool> missing_;  // by page of the plan
     bool use_standing_ = false;
     bool pages_fit_ = false;
     std::vector<std::int32_t> tile_of_node_, node_of_tile_;

@@ -42,6 +42,7 @@ struct SelectionSettings {
     ErrorMetric metric = ErrorMetric::guaranteed;
     Culling culling = Culling::box;  ///< corners: of the tiles to draw, those without a corner in view are left out
     bool list_tiles = false;         ///< fill Selection::tiles
+    bool plan_only = false;          ///< what to want is all that is asked: nothing is chosen to draw
 
     friend bool operator==(const SelectionSettings&, const SelectionSettings&) = default;
 };

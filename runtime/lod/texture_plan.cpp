@@ -71,22 +71,24 @@ std::int64_t TexturePlan::wish(const Cut& cut, std::span<const LodView> views, c
         if (level > 0) ++count;
         mark_wanted(node.texture_slot);
         if (node.leaf && !node.split && deeper_than_heights())
-            wish_deep(node, {{}, node.texture_slot, node.texture_need});
+            wish_deep(node, k, {{}, node.texture_slot, node.texture_need});
     }
     return count + static_cast<std::int64_t>(deep_.size());
 }
 
-void TexturePlan::hand_over(const Cut& cut, std::vector<std::int32_t>& planned,
-                            std::vector<TileRequest>& requests) const {
-    const auto take = [&](TileId id, std::int32_t slot, double need) {
-        if (slot >= 0)
+void TexturePlan::hand_over(const Cut& cut, std::vector<std::int32_t>& planned, std::vector<TileRequest>& requests,
+                            std::vector<bool>& missing) const {
+    const auto take = [&](TileId id, std::int32_t slot, double need, std::size_t node) {
+        if (slot >= 0) {
             planned.push_back(slot);
-        else if (slot == kNotResident)
+        } else if (slot == kNotResident) {
             requests.push_back({TileKind::texture, id, need});
+            missing[node] = true;
+        }
     };
     for (std::size_t k = 0; k < needs_.size(); ++k)
-        if (needs_[k] > 0) take(cut.nodes()[k].id, cut.nodes()[k].texture_slot, needs_[k]);
-    for (const DeepWish& wish : deep_) take(wish.id, wish.slot, wish.need);
+        if (needs_[k] > 0) take(cut.nodes()[k].id, cut.nodes()[k].texture_slot, needs_[k], k);
+    for (const DeepWish& wish : deep_) take(wish.id, wish.slot, wish.need, wish.node);
 }
 
 void TexturePlan::used(std::vector<std::int32_t>& slots) const {
@@ -201,12 +203,12 @@ void TexturePlan::for_each_deep_child(const CutNode& node, const Part& part, con
     }
 }
 
-void TexturePlan::wish_deep(const CutNode& node, const Part& part) {
+void TexturePlan::wish_deep(const CutNode& node, std::size_t index, const Part& part) {
     for_each_deep_child(node, part, [&](const Part& child) {
         if (!(child.need > 1)) return;
-        deep_.push_back({texture_of(node, child.part), child.slot, child.need});
+        deep_.push_back({texture_of(node, child.part), child.slot, child.need, index});
         mark_wanted(child.slot);
-        wish_deep(node, child);
+        wish_deep(node, index, child);
     });
 }
 

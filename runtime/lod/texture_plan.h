@@ -27,8 +27,10 @@ public:
     /// must outlive the calls below.
     std::int64_t wish(const Cut& cut, std::span<const LodView> views, const CutSettings& settings,
                       const Residency& residency);
-    /// Slots of what is wanted and resident, coarse before fine, and requests for the rest.
-    void hand_over(const Cut& cut, std::vector<std::int32_t>& planned, std::vector<TileRequest>& requests) const;
+    /// Slots of what is wanted and resident, coarse before fine, and requests for the rest; `missing`, by node of the
+    /// cut: becomes true where something is asked for at or under the node itself.
+    void hand_over(const Cut& cut, std::vector<std::int32_t>& planned, std::vector<TileRequest>& requests,
+                   std::vector<bool>& missing) const;
     /// Sets the texture of a leaf: the one wanted, or the nearest resident ancestor. `fade_s`: a texture younger than
     /// that is blended in over its ancestor's. False: an ancestor's stands in for a texture that is missing.
     bool place(const Cut& cut, std::int32_t leaf, double fade_s, DrawItem& item);
@@ -44,6 +46,7 @@ private:
         TileId id;
         std::int32_t slot;
         double need;
+        std::size_t node;  ///< of the cut, whose part it is
     };
     struct Part;
     double texel_m(int level) const { return texel_m_[static_cast<std::size_t>(level)]; }
@@ -51,7 +54,7 @@ private:
     double texel_per_px(const CutNode& node, TilePart part) const;
     template <class Visit>
     void for_each_deep_child(const CutNode& node, const Part& part, const Visit& visit) const;
-    void wish_deep(const CutNode& node, const Part& part);
+    void wish_deep(const CutNode& node, std::size_t index, const Part& part);
     void emit_part(const CutNode& node, const Part& part, const DrawItem& item, DrawList& out) const;
     std::int32_t wanted_slot_at(TileId texture) const;
     void mark_wanted(std::int32_t slot);

@@ -338,6 +338,7 @@ bool Scene::look_ahead(std::span<const Camera> views, SelectionSettings settings
     const double zoom = wide.focal_px() / ahead.focal_px();
     settings.tau_px *= zoom * wide.off_axis_factor() / ahead.off_axis_factor();
     settings.texture_tau_px *= zoom;
+    settings.plan_only = true;
     const Selection& future = ahead_->select({&wide, 1}, settings, pager_->residency());
     // A future that does not fit is no help to the present.
     if (future.budget_limited) return false;

@@ -37,11 +37,18 @@ public:
     bool may_see(const Box& box) const;
     bool contains(glm::dvec3 point) const;
 
+    // Its planes: the first looks forward and lies near_m() before the eye; the others go through the eye.
+    static constexpr int kPlanes = 5;
+    glm::dvec3 eye() const { return eye_; }
+    double near_m() const { return near_m_; }
+    const glm::dvec3& normal(int plane) const { return normals_[static_cast<std::size_t>(plane)]; }
+    /// |normal|: times half a box's sides, how far the box reaches along the normal.
+    const glm::dvec3& reach(int plane) const { return reaches_[static_cast<std::size_t>(plane)]; }
+
 private:
     glm::dvec3 eye_;
-    glm::dvec3 forward_;
     double near_m_;
-    std::array<glm::dvec3, 4> normals_;  ///< pointing inward, through the eye
+    std::array<glm::dvec3, kPlanes> normals_, reaches_;  ///< pointing inward
 };
 
 }  // namespace scree
