@@ -5,7 +5,9 @@
 #include <cmath>
 #include <fstream>
 
+#include "common/mesh/geometric_error.h"
 #include "common/query/ground.h"
+#include "common/store/height_codec.h"
 #include "common/store/sqlite_store.h"
 #include "tests/common/test_support.h"
 #include "tests/programs/placement_inputs.h"
@@ -193,6 +195,55 @@ TEST_F(Insets, FillVoidsOfTheirBase) {
     EXPECT_NEAR(height_in(store_, inset_.x(160, 128), inset_.y(160, 128)),
                 land(inset_.x(160, 128), inset_.y(160, 128), 3), 0.1);
     EXPECT_TRUE(std::isnan(height_in(store_, base_.x(47, 0), base_.y(0, 60)))) << "void, and no inset";
+}
+
+// The greatest step, in metres, from a vertex of present cells to one beside it that has none, in leaves that lack
+// cells.
+double greatest_step_at_rims(const std::string& store) {
+    const auto opened = SqliteStore::open(store);
+    const Dataset& d = (*opened)->dataset();
+    const auto m = static_cast<std::size_t>(d.lattice.tile_cells());
+    std::int32_t greatest = 0;
+    const auto ok = (*opened)->for_each(TileKind::height, [&](const SqliteStore::RowView& row) {
+        const auto tile = decode_height_tile(row.payload, d.lattice.tile_cells_log2, row.codec);
+        if (!tile || tile->header.child_mask != 0 || tile->presence.empty()) return true;
+        const auto vertices = present_vertices(tile->presence, d.lattice.tile_cells_log2);
+        const auto look = [&](std::size_t a, std::size_t b) {
+            if (vertices[a] != vertices[b])
+                greatest = std::max(greatest, std::abs(tile->samples[a] - tile->samples[b]));
+        };
+        for (std::size_t r = 0; r <= m; ++r)
+            for (std::size_t c = 0; c <= m; ++c) {
+                if (c < m) look(r * (m + 1) + c, r * (m + 1) + c + 1);
+                if (r < m) look(r * (m + 1) + c, (r + 1) * (m + 1) + c);
+            }
+        return true;
+    });
+    EXPECT_TRUE(ok);
+    return greatest * d.height_quantum_m;
+}
+
+TEST_F(Insets, EndOverVoidsWithoutASpike) {
+    // Far above the base, whose rows would put its own heights beside them. The void reaches the border: it stays.
+    const auto with_void = [&](const std::string& name, int last_column) {
+        return write_placed_heights(
+            folder_.file(""), name, HeightFormat::striped, base_, [&, last_column](int c, int r) {
+                return c <= last_column && r > 36 && r < 75 ? kVoid : land(base_.x(c, r), base_.y(c, r), 0);
+            });
+    };
+    const std::string inset = write("inset", inset_, 3, 800);
+    look_at(inset_.first_x, inset_.first_y, land(inset_.first_x, inset_.first_y, 0) + 800);
+    for (const int last_column : {60, 45}) {  // all of its rim lies over the void; half of it
+        const std::vector<std::string> files{with_void("base" + std::to_string(last_column), last_column), inset};
+        build(files, store_, {"--nodata", "-9999"});
+        // With half of it over the base, base and inset end 800 m apart beside one another, and what is between is
+        // steep.
+        if (last_column == 60) {
+            EXPECT_LT(greatest_step_at_rims(store_), 6);
+        }
+        expect_sound(store_, files, {"--nodata", "-9999"}, true);
+        EXPECT_TRUE(std::isnan(height_in(store_, inset_.first_x - 40, inset_.y(0, 100))));
+    }
 }
 
 TEST_F(Insets, OfSeveralResolutionsLieOverOneAnother) {

@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <limits>
 #include <mutex>
@@ -10,14 +11,13 @@
 #include "tools/pyramid/sample_range.h"
 
 namespace scree {
-namespace {
 
 // Where the base's cells hold a point: base sample west and north of it, and the shares on the way to the next.
 struct BasePlace {
     std::int64_t i, j;
     double east, south;
 };
-BasePlace base_place(std::int64_t i, std::int64_t j, int shift) {
+static BasePlace base_place(std::int64_t i, std::int64_t j, int shift) {
     const std::int64_t step = std::int64_t{1} << shift;
     return {i >> shift, j >> shift, static_cast<double>(i & (step - 1)) / static_cast<double>(step),
             static_cast<double>(j & (step - 1)) / static_cast<double>(step)};
@@ -48,6 +48,8 @@ public:
         const std::int64_t i1 = p.i + (p.east > 0 ? 1 : 0), j1 = p.j + (p.south > 0 ? 1 : 0);
         return valid(p.i, p.j) && valid(i1, p.j) && valid(p.i, j1) && valid(i1, j1);
     }
+    /// Of a base point itself, beyond the data too.
+    double at(std::int64_t i, std::int64_t j) const { return value(std::max(i, i0_), std::max(j, j0_)); }
     double between(const BasePlace& p) const {
         const double north = value(p.i, p.j) * (1 - p.east) + value(p.i + 1, p.j) * p.east;
         const double south = value(p.i, p.j + 1) * (1 - p.east) + value(p.i + 1, p.j + 1) * p.east;
@@ -63,7 +65,72 @@ private:
     std::vector<std::uint8_t> valid_;
 };
 
-}  // namespace
+// Under points without a height: on the points of every second step, from the base down, what stands half-way between
+// those of twice the step. So a surface that ends goes on from its last samples to the base's, a step at a time, and
+// what a point gets depends on its place alone.
+class DeepHeights::Support {
+public:
+    Support(const DeepHeights& heights, const BaseWindow& base) : heights_(heights), base_(base) {}
+
+    /// Puts support where `values` (points of the rectangle) are NaN.
+    Result<void> lay(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows, std::int64_t stride,
+                     std::span<double> values) const {
+        Grid coarse;
+        for (std::int64_t step = std::int64_t{1} << (heights_.shift_ - 1); step >= stride; step /= 2) {
+            Grid grid{i / step * step, j / step * step, step, 0, 0, {}};
+            grid.columns = (i + (columns - 1) * stride - grid.i + step - 1) / step + 1;
+            grid.rows = (j + (rows - 1) * stride - grid.j + step - 1) / step + 1;
+            if (auto ok = fill(grid, coarse); !ok) return ok;
+            coarse = std::move(grid);
+        }
+        assert(coarse.columns == columns && coarse.rows == rows);
+        for (std::size_t k = 0; k < values.size(); ++k)
+            if (std::isnan(values[k])) values[k] = coarse.values[k];
+        return {};
+    }
+
+private:
+    struct Grid {
+        std::int64_t i = 0, j = 0, step = 0, columns = 0, rows = 0;
+        std::vector<double> values;
+        double at(std::int64_t pi, std::int64_t pj) const {
+            return values[static_cast<std::size_t>((pj - j) / step * columns + (pi - i) / step)];
+        }
+    };
+
+    // `coarse`: of twice the step around it; empty: the base.
+    Result<void> fill(Grid& grid, const Grid& coarse) const {
+        grid.values.resize(static_cast<std::size_t>(grid.columns * grid.rows));
+        if (auto ok = heights_.grid_.sample(grid.i, grid.j, grid.columns, grid.rows, grid.step, grid.values); !ok)
+            return ok;
+        const auto above = [&](std::int64_t pi, std::int64_t pj) {
+            return coarse.values.empty() ? base_.at(pi >> heights_.shift_, pj >> heights_.shift_) : coarse.at(pi, pj);
+        };
+        const std::int64_t twice = 2 * grid.step;
+        for (std::int64_t r = 0; r < grid.rows; ++r)
+            for (std::int64_t c = 0; c < grid.columns; ++c) {
+                double& value = grid.values[static_cast<std::size_t>(r * grid.columns + c)];
+                const std::int64_t pi = grid.i + c * grid.step, pj = grid.j + r * grid.step;
+                const BasePlace p = base_place(pi, pj, heights_.shift_);
+                value = heights_.height(value, p, base_);
+                if (!std::isnan(value)) continue;
+                const std::int64_t west = pi / twice * twice, north = pj / twice * twice;
+                const std::int64_t east = west + (pi == west ? 0 : twice), south = north + (pj == north ? 0 : twice);
+                value = (above(west, north) + above(east, north) + above(west, south) + above(east, south)) / 4;
+            }
+        return {};
+    }
+
+    const DeepHeights& heights_;
+    const BaseWindow& base_;
+};
+
+// NaN: there is none.
+double DeepHeights::height(double layers, const BasePlace& p, const BaseWindow& base) const {
+    if (p.east == 0 && p.south == 0) return base.at(p.i, p.j);  // what the tiles above have, filled voids too
+    if (std::isfinite(layers)) return layers;
+    return base.valid_around(p) ? base.between(p) : std::numeric_limits<double>::quiet_NaN();
+}
 
 Result<void> DeepHeights::sample(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
                                  std::int64_t stride, std::span<std::int32_t> out, std::span<std::uint8_t> valid,
@@ -72,19 +139,21 @@ Result<void> DeepHeights::sample(std::int64_t i, std::int64_t j, std::int64_t co
     if (auto ok = grid_.sample(i, j, columns, rows, stride, values); !ok) return ok;
     auto window = BaseWindow::read(base_, i, j, i + (columns - 1) * stride, j + (rows - 1) * stride, shift_);
     if (!window) return window.error();
+    bool lacking = false;
     for (std::int64_t r = 0; r < rows; ++r)
         for (std::int64_t c = 0; c < columns; ++c) {
             const auto k = static_cast<std::size_t>(r * columns + c);
             const BasePlace p = base_place(i + c * stride, j + r * stride, shift_);
-            double value = values[k];
-            if (p.east == 0 && p.south == 0)
-                value = window->value(p.i, p.j);  // what the tiles above have, filled voids too
-            else if (!std::isfinite(value))
-                value = window->between(p);
             valid[k] = std::isfinite(values[k]) || window->valid_around(p) ? 1 : 0;
-            out[k] = quantizer_.quantize(value);
-            if (valid[k] != 0) worst_error_m = std::max(worst_error_m, quantizer_.error_m(value));
+            values[k] = height(values[k], p, *window);
+            lacking = lacking || std::isnan(values[k]);
         }
+    if (lacking)
+        if (auto ok = Support(*this, *window).lay(i, j, columns, rows, stride, values); !ok) return ok;
+    for (std::size_t k = 0; k < values.size(); ++k) {
+        out[k] = quantizer_.quantize(values[k]);
+        if (valid[k] != 0) worst_error_m = std::max(worst_error_m, quantizer_.error_m(values[k]));
+    }
     return {};
 }
 

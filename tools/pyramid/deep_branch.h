@@ -18,8 +18,12 @@
 
 namespace scree {
 
+struct BasePlace;
+class BaseWindow;
+
 /// Heights on the points of the finest lattice: base samples where there are some, else the layers' values, else (over
-/// voids) the base's filled samples between. Every value is finite. Any thread.
+/// voids) the base's filled samples between, else support: what stands half-way between points of twice the step.
+/// Every value is finite. Any thread.
 class DeepHeights {
 public:
     /// Base sample (i, j) is point (i << shift, j << shift) of `grid`.
@@ -33,6 +37,9 @@ public:
                         std::span<std::int32_t> out, std::span<std::uint8_t> valid, double& worst_error_m) const;
 
 private:
+    class Support;
+    double height(double layers, const BasePlace& place, const BaseWindow& base) const;
+
     const HeightGrid& grid_;
     const HeightSpool& base_;
     HeightQuantizer quantizer_;

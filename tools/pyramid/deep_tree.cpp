@@ -56,6 +56,16 @@ bool DeepTree::refined(TileId id) const {
     return refined_[static_cast<std::size_t>(id.level - base_level_)].count(pack(id.x, id.y)) != 0;
 }
 
+std::vector<TileId> DeepTree::refined_base_tiles() const {
+    std::vector<TileId> tiles;
+    if (refined_.empty()) return tiles;
+    std::vector<std::uint64_t> packed(refined_[0].begin(), refined_[0].end());
+    std::sort(packed.begin(), packed.end());
+    for (const std::uint64_t p : packed)
+        tiles.push_back({base_level_, static_cast<std::int64_t>(p & 0xFFFFFFFF), static_cast<std::int64_t>(p >> 32)});
+    return tiles;
+}
+
 std::int64_t DeepTree::count() const {
     std::size_t count = 0;
     for (const auto& level : refined_) count += level.size();

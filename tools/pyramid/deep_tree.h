@@ -24,6 +24,8 @@ public:
 
     bool refined(TileId id) const;
     int base_level() const { return base_level_; }
+    /// Of the base level, by rows.
+    std::vector<TileId> refined_base_tiles() const;
     /// Tiles that are refined at and below the base level.
     std::int64_t count() const;
 

@@ -226,6 +226,19 @@ Result<void> HeightSpool::read_stored(std::int64_t i, std::int64_t j, std::span<
 }
 
 template <class T>
+void HeightSpool::lay_support(std::int64_t i, std::int64_t j, std::span<T> values,
+                              std::span<const std::uint8_t> valid) const {
+    const auto row = support_.find(j);
+    if (row == support_.end()) return;
+    const auto end = row->second.lower_bound(i + static_cast<std::int64_t>(values.size()));
+    for (auto at = row->second.lower_bound(i); at != end; ++at) {
+        const auto k = static_cast<std::size_t>(at->first - i);
+        // Rounded as stored values are.
+        if (valid[k] == 0) values[k] = static_cast<T>(wide_ ? at->second : static_cast<float>(at->second));
+    }
+}
+
+template <class T>
 Result<void> HeightSpool::read_supported(std::int64_t j, std::span<T> values, std::span<std::uint8_t> valid) const {
     assert(j >= 0 && j < height_ && static_cast<std::int64_t>(values.size()) >= width_);
     values = values.first(static_cast<std::size_t>(width_));
@@ -236,7 +249,9 @@ Result<void> HeightSpool::read_supported(std::int64_t j, std::span<T> values, st
         mark_valid<T>(values, valid);
     else
         std::fill(valid.begin(), valid.end(), static_cast<std::uint8_t>(state == RowState::all_valid));
-    if (state != RowState::all_valid) support_row(values);
+    if (state == RowState::all_valid) return {};
+    support_row(values);
+    lay_support<T>(0, j, values, valid);
     return {};
 }
 
@@ -269,7 +284,10 @@ Result<void> HeightSpool::read_window(std::int64_t i, std::int64_t j, std::int64
         mark_valid<double>(row, flags);
         const bool complete = std::all_of(flags.begin(), flags.end(), [](std::uint8_t v) { return v != 0; });
         if (absent) std::fill(flags.begin(), flags.end(), std::uint8_t{0});
-        if (complete) continue;
+        if (complete) {
+            if (absent) lay_support<double>(i, j + r, row, flags);
+            continue;
+        }
         whole.resize(static_cast<std::size_t>(width_));
         whole_valid.resize(whole.size());
         if (auto ok = read_row(j + r, whole, whole_valid); !ok) return ok;

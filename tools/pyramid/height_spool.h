@@ -15,6 +15,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <limits>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -66,6 +67,10 @@ public:
     /// Replaces samples of row j, which must have a valid sample already. Summary is not changed by it.
     Result<void> write_samples(std::int64_t i, std::int64_t j, std::span<const double> values);
 
+    /// What stands under absent samples in place of the rule above, by rows and columns. Once, before rows are read.
+    using Support = std::map<std::int64_t, std::map<std::int64_t, double>>;
+    void set_support(Support support) { support_ = std::move(support); }
+
     std::int64_t width() const { return width_; }
     std::int64_t height() const { return height_; }
     bool wide() const { return wide_; }
@@ -82,6 +87,9 @@ private:
     std::int64_t supporting_row(std::int64_t j) const;
     template <class T>
     Result<void> read_stored(std::int64_t i, std::int64_t j, std::span<T> out) const;
+    /// Of absent samples among [i, i + values.size()) of row j.
+    template <class T>
+    void lay_support(std::int64_t i, std::int64_t j, std::span<T> values, std::span<const std::uint8_t> valid) const;
     template <class T>
     Result<void> read_supported(std::int64_t j, std::span<T> values, std::span<std::uint8_t> valid) const;
 
@@ -96,6 +104,7 @@ private:
     std::vector<RowState> rows_;  ///< of the rows appended so far
     Summary summary_;
     std::vector<std::int64_t> supporting_above_;  ///< of each row: the last one up to it with a valid sample, or -1
+    Support support_;
     std::int64_t first_supporting_ = -1, last_supporting_ = -1;
 };
 

@@ -11,6 +11,7 @@
 #include "tools/pyramid/deep_tree.h"
 #include "tools/pyramid/height_pyramid.h"
 #include "tools/pyramid/height_spool.h"
+#include "tools/pyramid/rim_support.h"
 #include "tools/pyramid/row_bands.h"
 #include "tools/pyramid/spool_rows.h"
 #include "tools/pyramid/warp_error.h"
@@ -139,7 +140,7 @@ Result<void> mark_layer(const MosaicPlan& m, const HeightStack& stack, std::size
     return {};
 }
 
-Result<std::unique_ptr<DeepPart>> plan_depth(const BuildPlan& plan, const HeightStack& stack, const HeightSpool& spool,
+Result<std::unique_ptr<DeepPart>> plan_depth(const BuildPlan& plan, const HeightStack& stack, HeightSpool& spool,
                                              const HeightQuantizer& quantizer) {
     const MosaicPlan& m = plan.mosaic;
     auto deep = std::make_unique<DeepPart>(plan);
@@ -149,6 +150,9 @@ Result<std::unique_ptr<DeepPart>> plan_depth(const BuildPlan& plan, const Height
     auto grid = stack.on(m.finest_grid(), m.crs);
     if (!grid) return grid.error();
     deep->grid = std::move(*grid);
+    auto support = rim_support(spool, *deep->grid, deep->tree, m.lattice.tile_cells_log2, m.base_shift);
+    if (!support) return support.error();
+    spool.set_support(std::move(*support));
     deep->heights.emplace(*deep->grid, spool, quantizer, m.base_shift);
     return deep;
 }
