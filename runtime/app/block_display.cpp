@@ -51,7 +51,7 @@ std::vector<SurfaceVertex> surface_vertices(const BlockScene& scene) {
 }
 
 Result<std::unique_ptr<SurfaceRenderer>> make_renderer(const BlockScene& scene) {
-    static_assert(BlockScene::kBytesPerSample == BlockWorld::kBytesPerSample + sizeof(SurfaceVertex) + 24);
+    static_assert(BlockScene::kBytesPerSample == BlockWorld::kBytesPerSample + sizeof(SurfaceVertex) + 24 + 3);
     const Dataset& d = scene.dataset();
     SurfaceOptions options{d.lattice, d.height_offset_m, d.height_quantum_m, 0, 1};
     const std::vector<SurfaceVertex> vertices = surface_vertices(scene);
@@ -60,7 +60,10 @@ Result<std::unique_ptr<SurfaceRenderer>> make_renderer(const BlockScene& scene) 
                             [](const SurfaceVertex& a, const SurfaceVertex& b) { return a.height_n < b.height_n; });
     options.low_n = static_cast<double>(low->height_n);
     options.high_n = static_cast<double>(high->height_n);
-    return SurfaceRenderer::create(options, vertices);
+    auto renderer = SurfaceRenderer::create(options, vertices);
+    if (!renderer) return renderer;
+    if (auto ok = (*renderer)->set_edge_field(scene.edge_field()); !ok) return ok.error();
+    return renderer;
 }
 
 }  // namespace
@@ -91,7 +94,7 @@ Result<void> BlockDisplay::warm_up() {
     const std::array<std::span<const std::uint32_t>, 1> pieces{triangle};
     FrameSettings settings = settings_;
     settings.wait_until_drawn = true;
-    auto times = renderer_->draw(camera, pieces, settings, *target_);
+    auto times = renderer_->draw(camera, pieces, 1, settings, *target_);
     if (!times) return times.error();
     return {};
 }
@@ -117,7 +120,7 @@ Result<void> BlockDisplay::resize(int width_px, int height_px) {
 }
 
 Result<FrameTimes> BlockDisplay::draw(const Camera& camera) {
-    return renderer_->draw(camera, scene_->pieces(), settings_, *target_);
+    return renderer_->draw(camera, scene_->pieces(), scene_->pieces_at_end(), settings_, *target_);
 }
 
 void BlockDisplay::show() {

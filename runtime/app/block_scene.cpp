@@ -16,15 +16,54 @@ Result<std::unique_ptr<BlockScene>> BlockScene::open(const TileStore& store, con
     if (!raster) return raster.error();
     auto world = BlockWorld::make(*raster);
     if (!world) return world.error();
-    return std::unique_ptr<BlockScene>(new BlockScene(store.dataset(), options.lod, options.tau_px, std::move(*world)));
+    return std::unique_ptr<BlockScene>(new BlockScene(store.dataset(), options, std::move(*world)));
 }
 
-BlockScene::BlockScene(const Dataset& dataset, const LodSettings& lod, double tau_px, BlockWorld world)
+BlockScene::BlockScene(const Dataset& dataset, const SceneOptions& options, BlockWorld world)
     : dataset_(dataset),
-      lod_(lod),
-      rules_(block_rules(lod, tau_px)),
+      lod_(options.lod),
+      rules_(block_rules(options.lod, options.tau_px)),
       world_(std::move(world)),
-      drawn_(static_cast<std::size_t>(world_.block_count())) {}
+      drawn_(static_cast<std::size_t>(world_.block_count())),
+      at_end_(static_cast<std::size_t>(world_.block_count())) {
+    if (options.soft_edge) make_edge_field();
+}
+
+// The band, and a field's cell, from any end; cells between blocks go with either.
+void BlockScene::make_edge_field() {
+    const double band_m = edge_band_m(dataset_.lattice);
+    const std::int64_t row = world_.bisection().row(), samples_x = world_.columns() * row,
+                       samples_y = world_.rows() * row;
+    edge_field_ = EdgeField::of_box(dataset_.lattice, samples_x - 1, samples_y - 1, band_m);
+    const double near = band_m / dataset_.lattice.spacing_m + 2 * edge_field_->shape().cell_side + 1;
+    const auto reaches = [near](std::int64_t first, std::int64_t last, std::int64_t samples) {
+        return static_cast<double>(first) < near || static_cast<double>(samples - 1 - last) < near;
+    };
+    for (std::int64_t y = 0; y < world_.rows(); ++y)
+        for (std::int64_t x = 0; x < world_.columns(); ++x)
+            at_end_[static_cast<std::size_t>(y * world_.columns() + x)] =
+                reaches(x * row, (x + 1) * row - 1, samples_x) || reaches(y * row, (y + 1) * row - 1, samples_y) ? 1
+                                                                                                                 : 0;
+}
+
+bool BlockScene::is_at_end(int block) const { return at_end_[static_cast<std::size_t>(block)] != 0; }
+
+// With whether it reaches into the band: a strip or a quad where one of its blocks does.
+template <class Take>
+void BlockScene::for_each_piece(const BlockFrame& frame, const Take& take) const {
+    const auto block_of = [this](std::uint32_t vertex) {
+        return static_cast<int>(vertex / world_.vertices_per_block());
+    };
+    for (const std::int32_t block : frame.blocks) take(world_.mesh(block), is_at_end(block));
+    for (const std::int32_t strip : frame.strips) {
+        const auto sides = world_.sides(strip);
+        take(world_.strip_mesh(strip), is_at_end(sides.a) || is_at_end(sides.b));
+    }
+    for (const std::int32_t quad : frame.quads) {
+        const auto mesh = world_.quad_mesh(quad);
+        take(mesh, std::any_of(mesh.begin(), mesh.end(), [&](std::uint32_t v) { return is_at_end(block_of(v)); }));
+    }
+}
 
 std::int64_t BlockScene::resident_bytes() const { return std::int64_t{world_.vertex_count()} * kBytesPerSample; }
 
@@ -37,12 +76,13 @@ const BlockFrame& BlockScene::select(const Camera& camera) {
     const BlockFrame& frame = world_.select(camera, rules_);
     std::fill(drawn_.begin(), drawn_.end(), std::uint8_t{0});
     pieces_.clear();
-    for (const std::int32_t block : frame.blocks) {
-        drawn_[static_cast<std::size_t>(block)] = 1;
-        pieces_.push_back(world_.mesh(block));
-    }
-    for (const std::int32_t strip : frame.strips) pieces_.push_back(world_.strip_mesh(strip));
-    for (const std::int32_t quad : frame.quads) pieces_.push_back(world_.quad_mesh(quad));
+    for (const std::int32_t block : frame.blocks) drawn_[static_cast<std::size_t>(block)] = 1;
+    for (const bool last : {false, true})
+        for_each_piece(frame, [&](std::span<const std::uint32_t> mesh, bool at_end) {
+            if (at_end == last) pieces_.push_back(mesh);
+        });
+    pieces_at_end_ = 0;
+    for_each_piece(frame, [&](std::span<const std::uint32_t>, bool at_end) { pieces_at_end_ += at_end ? 1 : 0; });
     return frame;
 }
 

@@ -18,8 +18,9 @@ namespace scree {
 
 class BlockScene {
 public:
-    /// With what OpenGL holds: a vertex, and two triangles of three indices where everything is drawn.
-    static constexpr std::int64_t kBytesPerSample = BlockWorld::kBytesPerSample + 16 + 24;
+    /// With what OpenGL holds: a vertex, and two triangles of three indices where everything is drawn. An EdgeField has
+    /// no more cells than there are samples.
+    static constexpr std::int64_t kBytesPerSample = BlockWorld::kBytesPerSample + 16 + 24 + 3;
 
     /// Of the options: budget, tau, lod; the curvature, which may not be on. Errors: ErrorCode::usage for that; those
     /// of read_height_raster() and BlockWorld::make().
@@ -38,6 +39,10 @@ public:
     const BlockFrame& select(const Camera& camera);
     /// Triangles drawn, three of the world's vertices each.
     std::span<const std::span<const std::uint32_t>> pieces() const { return pieces_; }
+    /// The last so many of them reach into the band of edge_field().
+    std::size_t pieces_at_end() const { return pieces_at_end_; }
+    /// Where the blocks end. Null without SceneOptions::soft_edge.
+    const std::shared_ptr<const EdgeField>& edge_field() const { return edge_field_; }
     LatticePoint lattice_point(std::uint32_t vertex) const;
     float height_n(std::uint32_t vertex) const;
     DrawnMesh drawn_mesh() const;
@@ -47,7 +52,11 @@ public:
     std::int64_t count_holes(const Camera& camera) const;
 
 private:
-    BlockScene(const Dataset& dataset, const LodSettings& lod, double tau_px, BlockWorld world);
+    BlockScene(const Dataset& dataset, const SceneOptions& options, BlockWorld world);
+    void make_edge_field();
+    bool is_at_end(int block) const;
+    template <class Take>
+    void for_each_piece(const BlockFrame& frame, const Take& take) const;
     bool is_drawn(std::int64_t x, std::int64_t y) const;
     bool covers(std::int64_t i, std::int64_t j) const;
     std::int64_t count_holes(const Camera& camera, int block) const;
@@ -56,8 +65,11 @@ private:
     LodSettings lod_;
     BlockRules rules_;
     BlockWorld world_;
-    std::vector<std::uint8_t> drawn_;  ///< blocks
+    std::vector<std::uint8_t> drawn_;   ///< blocks
+    std::vector<std::uint8_t> at_end_;  ///< blocks near the end
     std::vector<std::span<const std::uint32_t>> pieces_;
+    std::size_t pieces_at_end_ = 0;
+    std::shared_ptr<const EdgeField> edge_field_;
 };
 
 }  // namespace scree

@@ -130,7 +130,7 @@ DisplayOptions display_options(const ViewOptions& o) {
 
 void set_look(const ViewOptions& o, FrameSettings& s) {
     if (o.sun_direction) s.sun_direction = *o.sun_direction;
-    if (o.edge == "hard") s.edge_band_m = 0;
+    s.soft_edge = o.edge == "soft";
 }
 
 SceneOptions scene_options(const ViewOptions& o) {
@@ -141,6 +141,7 @@ SceneOptions scene_options(const ViewOptions& o) {
     s.curvature = o.curvature;
     s.lod = o.lod;
     s.morph = !o.no_morph;
+    s.soft_edge = o.edge == "soft";
     return s;
 }
 

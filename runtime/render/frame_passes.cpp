@@ -1,6 +1,7 @@
 #include "runtime/render/frame_passes.h"
 
 #include <epoxy/gl.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
@@ -81,12 +82,31 @@ void SkyPass::draw(const Camera& camera, const FrameSettings& settings) const {
     glDrawArrays(GL_TRIANGLES, 0, 3);
 }
 
-Result<EdgePass> EdgePass::create(int tile_cells_log2) {
-    EdgePass edge;
-    auto program = build_edge_program(tile_cells_log2);
-    if (!program) return program.error();
-    edge.program_ = std::move(*program);
-    return edge;
+Result<void> EdgePass::set_field(std::shared_ptr<const EdgeField> field) {
+    field_ = std::move(field);
+    texture_ = {};
+    if (!field_) return {};
+    GLuint name = 0;
+    glCreateTextures(GL_TEXTURE_2D, 1, &name);
+    texture_ = TextureHandle(name);
+    const auto columns = static_cast<GLsizei>(field_->shape().columns),
+               rows = static_cast<GLsizei>(field_->shape().rows);
+    glTextureStorage2D(name, 1, GL_R8, columns, rows);
+    for (const GLenum wrap : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T}) glTextureParameteri(name, wrap, GL_CLAMP_TO_EDGE);
+    for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
+        glTextureParameteri(name, filter, GL_LINEAR);
+    glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+    glTextureSubImage2D(name, 0, 0, 0, columns, rows, GL_RED, GL_UNSIGNED_BYTE, field_->values().data());
+    glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
+    if (glGetError() == GL_NO_ERROR) return {};
+    field_.reset();
+    texture_ = {};
+    return Error{ErrorCode::display,
+                 fmt::format("OpenGL has no texture of {} x {} for the ground's ends", columns, rows)};
+}
+
+const EdgeField* EdgePass::field_for(const FrameSettings& settings) const {
+    return settings.soft_edge && !settings.wireframe && !settings.magenta_background ? field_.get() : nullptr;
 }
 
 void EdgePass::begin(const Camera& camera, const RelativeFrame& frame, const Lattice& lattice,
@@ -94,20 +114,25 @@ void EdgePass::begin(const Camera& camera, const RelativeFrame& frame, const Lat
     const GLuint program = program_.name();
     set_position(program, camera, frame);
     set_atmosphere(program, camera, settings);
-    glProgramUniform4f(program, shader::kBoxUniform, static_cast<float>(lattice.x_m(0) - camera.eye.x),
-                       static_cast<float>(lattice.y_m(static_cast<double>(lattice.cells_y)) - camera.eye.y),
-                       static_cast<float>(lattice.x_m(static_cast<double>(lattice.cells_x)) - camera.eye.x),
-                       static_cast<float>(lattice.y_m(0) - camera.eye.y));
-    glProgramUniform1f(program, shader::kBandUniform, static_cast<float>(1 / settings.edge_band_m));
+    const EdgeField::Shape& shape = field_->shape();
+    const double cell_m = shape.cell_side * lattice.spacing_m;
+    const double per_m_x = 1 / (cell_m * static_cast<double>(shape.columns)),
+                 per_m_y = 1 / (cell_m * static_cast<double>(shape.rows));
+    glProgramUniform4f(program, shader::kEdgeFieldUniform, static_cast<float>(per_m_x), static_cast<float>(-per_m_y),
+                       static_cast<float>((camera.eye.x - lattice.x_m(0)) * per_m_x),
+                       static_cast<float>((lattice.y_m(0) - camera.eye.y) * per_m_y));
     glUseProgram(program);
+    glBindTextureUnit(shader::kEdgeFieldUnit, texture_.name());
     glEnable(GL_BLEND);
     glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
     glDepthMask(GL_FALSE);
+    glDepthFunc(GL_EQUAL);  // what was cut out of the ground is not drawn over either
 }
 
 void EdgePass::end() {
     glDisable(GL_BLEND);
     glDepthMask(GL_TRUE);
+    glDepthFunc(GL_GEQUAL);
 }
 
 }  // namespace scree

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <utility>
 
 #include "common/lattice.h"
 #include "common/result.h"
@@ -10,6 +12,7 @@
 #include "runtime/render/render_target.h"
 #include "runtime/render/renderer.h"
 #include "runtime/view/camera.h"
+#include "runtime/view/edge_field.h"
 #include "runtime/view/relative_frame.h"
 
 namespace scree {
@@ -34,18 +37,26 @@ private:
     VertexArrayHandle array_;  ///< no attributes
 };
 
-/// Dissolves the data's ends into what is behind them: the tiles there, once more, after the sky.
+/// Dissolves the ground's ends into what is behind them: what is drawn there, once more, after the sky.
 class EdgePass {
 public:
-    /// Errors (ErrorCode::display): the shader does not compile.
-    static Result<EdgePass> create(int tile_cells_log2);
-    /// State and uniforms for drawing tiles again; then end().
+    EdgePass() = default;
+    /// `program`: of build_edge_program() or build_surface_edge_program().
+    explicit EdgePass(ProgramHandle program) : program_(std::move(program)) {}
+
+    /// Where the ground ends, from now on; null: nowhere. Errors (ErrorCode::display): OpenGL has no memory for it.
+    Result<void> set_field(std::shared_ptr<const EdgeField> field);
+    /// What the pass goes by in a frame of these settings; null: it is not drawn.
+    const EdgeField* field_for(const FrameSettings& settings) const;
+    /// State and uniforms for drawing again; then end().
     void begin(const Camera& camera, const RelativeFrame& frame, const Lattice& lattice,
                const FrameSettings& settings) const;
     static void end();
 
 private:
     ProgramHandle program_;
+    std::shared_ptr<const EdgeField> field_;
+    TextureHandle texture_;
 };
 
 }  // namespace scree

@@ -108,6 +108,16 @@ Result<ProgramHandle> build_edge_program(int tile_cells_log2) {
          {}});
 }
 
+Result<ProgramHandle> build_surface_edge_program() {
+    using namespace shader_source;
+    return build_program(
+        {"surface edge",
+         {std::string(shared_constants), std::string(terrain_position), std::string(atmosphere),
+          std::string(surface_vert)},
+         {std::string(shared_constants), std::string(atmosphere), std::string(dither), std::string(edge_frag)},
+         {}});
+}
+
 Result<ProgramHandle> build_surface_program(bool with_haze) {
     using namespace shader_source;
     return build_program({"surface",

@@ -26,6 +26,7 @@ Result<ProgramHandle> build_terrain_program(const TerrainVariant& variant);
 /// Draws over tiles at the data's edge.
 Result<ProgramHandle> build_edge_program(int tile_cells_log2);
 /// Of SurfaceRenderer.
+Result<ProgramHandle> build_surface_edge_program();
 Result<ProgramHandle> build_surface_program(bool with_haze);
 Result<ProgramHandle> build_sky_program();
 /// Of LineRenderer.

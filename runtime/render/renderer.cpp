@@ -232,8 +232,9 @@ std::uint64_t Renderer::State::write_draws(std::span<const DrawItem> items, cons
 
 std::size_t Renderer::State::write_edge(std::span<const DrawItem> items, const FrameSettings& settings,
                                         const DrawStream::Region& region) const {
-    if (!(settings.edge_band_m > 0) || settings.wireframe || settings.magenta_background) return 0;
-    EdgeParts parts(options.lattice, settings.edge_band_m);
+    const EdgeField* field = edge.field_for(settings);
+    if (field == nullptr) return 0;
+    EdgeParts parts(*field);
     const std::size_t first = batches.draws().size(), room = region.commands.size();
     std::size_t count = 0;
     for (std::size_t draw = 0; draw < first; ++draw) {
@@ -349,9 +350,9 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const RendererOptions& option
     state->indices = std::move(*indices);
     state->plain_array = make_vertex_array(state->vertices, state->indices, false);
     state->blended_array = make_vertex_array(state->vertices, state->indices, true);
-    auto edge = EdgePass::create(tile_cells_log2);
+    auto edge = build_edge_program(tile_cells_log2);
     if (!edge) return edge.error();
-    state->edge = std::move(*edge);
+    state->edge = EdgePass(std::move(*edge));
     auto sky = SkyPass::create();
     if (!sky) return sky.error();
     state->sky = std::move(*sky);
@@ -367,6 +368,10 @@ void Renderer::upload_texture(int slot, std::span<const std::uint8_t> chain) { s
 
 void Renderer::upload_mesh(std::uint32_t first, std::span<const std::uint32_t> indices) {
     state_->indices.upload_mesh(first, indices);
+}
+
+Result<void> Renderer::set_edge_field(std::shared_ptr<const EdgeField> field) {
+    return state_->edge.set_field(std::move(field));
 }
 
 FrameTimes Renderer::draw(const Camera& camera, std::span<const DrawItem> items, const FrameSettings& settings,

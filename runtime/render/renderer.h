@@ -18,6 +18,7 @@
 #include "runtime/render/render_target.h"
 #include "runtime/render/texture_arena.h"
 #include "runtime/view/camera.h"
+#include "runtime/view/edge_field.h"
 
 namespace scree {
 
@@ -35,8 +36,8 @@ struct RendererOptions {
     /// Items a frame at most. Each may be two draws, of 124 bytes each, and two more at the data's ends, of 20 bytes,
     /// three times.
     int max_draws = 4096;
-    /// 1: off; up to 16: sharper imagery at grazing angles. Software OpenGL has one step of it, which doubles to triples
-    /// a frame (docs/numbers.md).
+    /// 1: off; up to 16: sharper imagery at grazing angles. Software OpenGL has one step of it, which doubles to
+    /// triples a frame (docs/numbers.md).
     double anisotropy = 1;
     /// Textures in one array at most, 1 to kMaxArrayLayers: fewer make more arrays, for tests.
     int max_array_layers = kMaxArrayLayers;
@@ -55,9 +56,9 @@ struct FrameSettings {
     double haze_scale_height_m = 2500;
     /// Height (z) of the plane that stands in for the world beyond the data.
     double ground_height_m = 0;
-    /// Metres over which the data's ends (its lattice's) dissolve into what is behind; 0: they are cut. Larger hides
-    /// more of the data and costs the drawing of sky on it. Not with wireframe or magenta_background.
-    double edge_band_m = 0;
+    /// The ground's ends dissolve into what is behind, where the renderer was given an EdgeField; false: they are cut.
+    /// Costs the drawing of sky on them. Not with wireframe or magenta_background.
+    bool soft_edge = true;
     /// 1 / (2 R) of the earth's curvature, 1/m; 0: flat.
     double half_curvature = 0;
     /// For finding faults.
@@ -94,6 +95,10 @@ public:
     /// Indices of the MeshPool from `first` on, within mesh_indices: whatever MeshPool::written_since() tells, before
     /// the meshes are drawn. What was drawn before keeps the old ones.
     void upload_mesh(std::uint32_t first, std::span<const std::uint32_t> indices);
+
+    /// Where the ground ends, from now on; null (at first): nowhere that would be known. Its raster is of the
+    /// renderer's lattice. Errors (ErrorCode::display): OpenGL has no memory for it; then as with null.
+    Result<void> set_edge_field(std::shared_ptr<const EdgeField> field);
 
     /// Takes state that it does not set (masks, stencil, polygon offset) for OpenGL's initial one.
     /// Clears `target`, draws `items` (slots uploaded before; at most max_draws) and the sky. The camera's size is the

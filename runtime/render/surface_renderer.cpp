@@ -80,11 +80,13 @@ struct SurfaceRenderer::State {
     VertexArrayHandle array;
     std::array<ProgramHandle, 2> ground;  ///< without haze and with it
     SkyPass sky;
+    EdgePass edge;
     std::array<glm::vec3, shader::kTintColours> tints;
 
     /// Returns how many.
     Result<std::size_t> upload(std::span<const std::span<const std::uint32_t>> pieces);
     void draw_ground(const Camera& camera, const FrameSettings& settings, std::size_t count) const;
+    void draw_edge(const Camera& camera, const FrameSettings& settings, std::size_t first, std::size_t count) const;
 };
 
 // Whole, every frame: the driver keeps what frames under way still read.
@@ -131,6 +133,19 @@ void SurfaceRenderer::State::draw_ground(const Camera& camera, const FrameSettin
     glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
 }
 
+// Indices `first` to `count`, once more.
+void SurfaceRenderer::State::draw_edge(const Camera& camera, const FrameSettings& settings, std::size_t first,
+                                       std::size_t count) const {
+    if (first == count || edge.field_for(settings) == nullptr) return;
+    edge.begin(camera,
+               make_relative_frame(options.lattice, options.height_offset_m, options.height_quantum_m, camera.eye, 0),
+               options.lattice, settings);
+    glBindVertexArray(array.name());
+    glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(count - first), GL_UNSIGNED_INT,
+                   reinterpret_cast<const void*>(first * sizeof(std::uint32_t)));
+    EdgePass::end();
+}
+
 SurfaceRenderer::SurfaceRenderer(std::unique_ptr<State> state) : state_(std::move(state)) {}
 SurfaceRenderer::~SurfaceRenderer() = default;
 
@@ -148,6 +163,9 @@ Result<std::unique_ptr<SurfaceRenderer>> SurfaceRenderer::create(const SurfaceOp
     auto sky = SkyPass::create();
     if (!sky) return sky.error();
     state->sky = std::move(*sky);
+    auto edge = build_surface_edge_program();
+    if (!edge) return edge.error();
+    state->edge = EdgePass(std::move(*edge));
     state->vertices = make_buffer();
     state->indices = make_buffer();
     glNamedBufferStorage(state->vertices.name(), static_cast<GLsizeiptr>(vertices.size_bytes()), vertices.data(), 0);
@@ -158,15 +176,25 @@ Result<std::unique_ptr<SurfaceRenderer>> SurfaceRenderer::create(const SurfaceOp
     return std::unique_ptr<SurfaceRenderer>(new SurfaceRenderer(std::move(state)));
 }
 
+Result<void> SurfaceRenderer::set_edge_field(std::shared_ptr<const EdgeField> field) {
+    return state_->edge.set_field(std::move(field));
+}
+
 Result<FrameTimes> SurfaceRenderer::draw(const Camera& camera, std::span<const std::span<const std::uint32_t>> pieces,
-                                         const FrameSettings& settings, RenderTarget& target) {
+                                         std::size_t at_end, const FrameSettings& settings, RenderTarget& target) {
+    assert(at_end <= pieces.size());
     assert(camera.width_px == target.width_px() && camera.height_px == target.height_px());
     const Clock::time_point start = Clock::now();
     auto count = state_->upload(pieces);
     if (!count) return count.error();
     begin_picture(target);
     state_->draw_ground(camera, settings, *count);
-    if (!settings.magenta_background) state_->sky.draw(camera, settings);
+    if (!settings.magenta_background) {
+        state_->sky.draw(camera, settings);
+        std::size_t first = *count;
+        for (const auto& piece : pieces.last(at_end)) first -= piece.size();
+        state_->draw_edge(camera, settings, first, *count);
+    }
     FrameTimes times;
     times.draws = *count > 0 ? 1 : 0;
     times.triangles = *count / 3;

@@ -39,11 +39,15 @@ public:
     SurfaceRenderer(const SurfaceRenderer&) = delete;
     SurfaceRenderer& operator=(const SurfaceRenderer&) = delete;
 
+    /// As Renderer's.
+    Result<void> set_edge_field(std::shared_ptr<const EdgeField> field);
+
     /// Clears `target`, draws the triangles of all pieces (three vertex numbers each, counter-clockwise from above; not
-    /// checked) and the sky. The camera's size is the target's. Of the settings, there are no levels to colour by, and
-    /// the world is flat. Errors (ErrorCode::display): no memory for the triangles.
+    /// checked) and the sky. The last `at_end` pieces are all that reach into the EdgeField's band. The camera's size
+    /// is the target's. Of the settings, there are no levels to colour by, and the world is flat. Errors
+    /// (ErrorCode::display): no memory for the triangles.
     Result<FrameTimes> draw(const Camera& camera, std::span<const std::span<const std::uint32_t>> pieces,
-                            const FrameSettings& settings, RenderTarget& target);
+                            std::size_t at_end, const FrameSettings& settings, RenderTarget& target);
 
 private:
     struct State;

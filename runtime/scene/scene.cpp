@@ -43,6 +43,8 @@ constexpr double kStill_m = 1e-3;
 /// Grows whenever a tile comes, goes or turns out to be damaged.
 std::int64_t changes(const PagerCounters& c) { return c.tiles_paged_in + c.tiles_paged_out + c.damaged_tiles; }
 
+bool has_edge_field(const SceneOptions& options) { return options.soft_edge && options.textures; }
+
 bool same_view(const Camera& a, const Camera& b) {
     return a.eye == b.eye && a.forward == b.forward && a.up == b.up && a.fov_deg == b.fov_deg &&
            a.width_px == b.width_px && a.height_px == b.height_px && a.near_m == b.near_m;
@@ -74,6 +76,7 @@ Scene::Scene(std::shared_ptr<const SqliteStore> store, const SceneOptions& optio
     : store_(std::move(store)), options_(options), memory_(memory), peak_resident_bytes_(memory.resident_bytes) {
     make_selectors();
     make_mesher();
+    make_edge_field();
 }
 
 Scene::~Scene() = default;
@@ -99,6 +102,7 @@ MoreMemory Scene::more_memory(const Dataset& dataset, const SceneOptions& option
     if (options.lod.method != LodMethod::geomip)
         more = {PageMesher::slot_cost(dataset), PageMesher::fixed_cost(dataset)};
     if (options.lod.metric == ErrorMetric::deboer) more.per_height_slot = Pager::corrections_cost();
+    if (has_edge_field(options)) more.fixed += EdgeField::bytes(dataset, options.follow);
     return more;
 }
 
@@ -120,6 +124,10 @@ void Scene::make_mesher() {
         mesher_->renew(dataset(), memory_.height_slots);
     else
         mesher_ = std::make_unique<PageMesher>(dataset(), options_.lod, memory_.height_slots);
+}
+
+void Scene::make_edge_field() {
+    if (has_edge_field(options_)) edge_field_ = EdgeField::read(*store_, edge_band_m(dataset().lattice));
 }
 
 // Thins what was selected, where the method does.
@@ -146,7 +154,9 @@ Result<void> Scene::start(TileSink& sink) {
 }
 
 void Scene::begin_watch() {
-    if (options_.follow) watch_ = std::make_unique<StoreWatch>(store_, std::max(options_.loader_threads, 1));
+    if (options_.follow)
+        watch_ = std::make_unique<StoreWatch>(
+            store_, StoreReading{std::max(options_.loader_threads, 1), has_edge_field(options_)});
 }
 
 void Scene::tell(const std::string& message) const {
@@ -189,6 +199,7 @@ Result<void> Scene::use_store(std::shared_ptr<const SqliteStore> store) {
     peak_resident_bytes_ = std::max(peak_resident_bytes_, memory_.resident_bytes);
     make_selectors();
     make_mesher();
+    make_edge_field();
     return sink_ != nullptr ? sink_->renew(dataset(), memory_) : Result<void>{};
 }
 
@@ -234,6 +245,7 @@ Result<void> Scene::take_up(OpenedStore opened) {
     forget_selections();
     if (!fits_in_place(opened.store->dataset())) return start_over(std::move(opened.store));
     coming_ = opened.store;
+    coming_edge_field_ = std::move(opened.edge_field);
     coming_selector_ = std::make_unique<Selector>(coming_->dataset());
     roots_since_s_.reset();
     pager_->begin_takeover({coming_, std::move(opened.readers)});
@@ -246,6 +258,7 @@ Result<void> Scene::start_over(std::shared_ptr<const SqliteStore> store) {
         earlier_loads_[static_cast<std::size_t>(kind)] = loader_counters(kind);
     pager_.reset();  // never the memory of two
     coming_.reset();
+    coming_edge_field_.reset();
     coming_selector_.reset();
     if (auto ok = use_store(std::move(store)); !ok) return ok;
     if (auto ok = make_pager(); !ok) return ok;
@@ -268,6 +281,7 @@ Result<void> Scene::set_exaggeration(double exaggeration) {
 void Scene::switch_over() {
     pager_->switch_over();
     store_ = std::move(coming_);
+    edge_field_ = std::move(coming_edge_field_);
     selector_ = std::move(coming_selector_);
     ahead_ = std::make_unique<Selector>(dataset());
     forget_selections();

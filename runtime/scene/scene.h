@@ -17,6 +17,7 @@
 #include "runtime/paging/pager.h"
 #include "runtime/scene/store_watch.h"
 #include "runtime/view/curvature.h"
+#include "runtime/view/edge_field.h"
 #include "runtime/view/foresight.h"
 
 namespace scree {
@@ -33,6 +34,9 @@ struct SceneOptions {
     int loader_threads = 2;
     int latency_ms = 0;
     bool textures = true;
+    /// Keep an EdgeField, for ends that dissolve: 1.5 MB of the budget, 5 with `follow`, at most; open() reads some
+    /// textures. Not without textures.
+    bool soft_edge = true;
     bool follow = false;  ///< take up what updates make of the store; else a changed store is an error of complete()
     std::int64_t upload_bytes_per_frame = 4 << 20;  ///< about 90 textures; larger arrives sooner and may hitch
     /// Told what is wrong and is borne: a damaged tile, an update that cannot be opened. Empty: to standard error.
@@ -74,6 +78,8 @@ public:
     const PageMesher* mesher() const { return mesher_.get(); }
     /// The meshes that the tiles drawn are drawn with; stays where it is. Null likewise.
     const MeshPool* meshes() const { return mesher_ ? &mesher_->pool() : nullptr; }
+    /// Where the ground ends, of dataset(). Null without options.soft_edge.
+    const std::shared_ptr<const EdgeField>& edge_field() const { return edge_field_; }
     /// Greatest of memory().resident_bytes so far.
     std::int64_t peak_resident_bytes() const { return peak_resident_bytes_; }
     /// Of all the flight, whatever was taken up.
@@ -113,6 +119,7 @@ private:
     Scene(std::shared_ptr<const SqliteStore> store, const SceneOptions& options, const MemoryPlan& memory);
     void make_selectors();
     void make_mesher();
+    void make_edge_field();
     void mesh(std::span<const Camera> views, double half_curvature, const Residency& residency, Selection& selection);
     static MoreMemory more_memory(const Dataset& dataset, const SceneOptions& options);
     static Result<MemoryPlan> plan_of(const Dataset& dataset, const SceneOptions& options);
@@ -140,6 +147,7 @@ private:
     std::shared_ptr<const SqliteStore> store_;
     SceneOptions options_;
     MemoryPlan memory_;
+    std::shared_ptr<const EdgeField> edge_field_, coming_edge_field_;
     TileSink* sink_ = nullptr;
     std::unique_ptr<PageMesher> mesher_;
     std::unique_ptr<Sink> mesher_sink_;

@@ -25,13 +25,12 @@ FrameSettings scenery(const Dataset& d) {
     const double extent = static_cast<double>(std::max(d.lattice.cells_x, d.lattice.cells_y)) * d.lattice.spacing_m;
     s.haze_distance_m = 2.2 * extent;
     s.haze_scale_height_m = std::max(0.08 * extent, d.max_height_m - d.min_height_m);
-    s.edge_band_m = 0.015 * extent;
     s.ground_height_m = d.min_height_m;
     return s;
 }
 
 Result<std::unique_ptr<SceneRenderer>> SceneRenderer::create(const Scene& scene, const SceneRendererOptions& options) {
-    std::unique_ptr<SceneRenderer> made(new SceneRenderer(options, scene.meshes()));
+    std::unique_ptr<SceneRenderer> made(new SceneRenderer(options, scene));
     made->settings_ = scenery(scene.dataset());
     if (auto ok = made->make_renderer(scene.dataset(), scene.memory()); !ok) return ok.error();
     return made;
@@ -40,8 +39,10 @@ Result<std::unique_ptr<SceneRenderer>> SceneRenderer::create(const Scene& scene,
 Result<void> SceneRenderer::make_renderer(const Dataset& dataset, const MemoryPlan& plan) {
     renderer_.reset();  // never the memory of two
     renderer_options_ = options_of(dataset, plan, options_.anisotropy);
-    renderer_options_.mesh_indices = meshes_ != nullptr ? meshes_->capacity() : 0;
+    const MeshPool* meshes = scene_.meshes();
+    renderer_options_.mesh_indices = meshes != nullptr ? meshes->capacity() : 0;
     meshes_passed_on_ = 0;
+    edge_field_.reset();
     auto renderer = Renderer::create(renderer_options_);
     if (!renderer) return renderer.error();
     renderer_ = std::move(*renderer);
@@ -76,15 +77,24 @@ void SceneRenderer::put_texture(std::int32_t slot, std::span<const std::uint8_t>
 }
 
 void SceneRenderer::pass_meshes_on() {
-    if (meshes_ == nullptr) return;
-    for (const MeshPool::Piece& piece : meshes_->written_since(meshes_passed_on_))
+    const MeshPool* meshes = scene_.meshes();
+    if (meshes == nullptr) return;
+    for (const MeshPool::Piece& piece : meshes->written_since(meshes_passed_on_))
         renderer_->upload_mesh(piece.first, piece.indices);
-    meshes_passed_on_ = meshes_->written();
+    meshes_passed_on_ = meshes->written();
+}
+
+// Without memory for it the ends are cut.
+void SceneRenderer::pass_edge_field_on() {
+    if (edge_field_ == scene_.edge_field()) return;
+    edge_field_ = scene_.edge_field();
+    [[maybe_unused]] const auto ok = renderer_->set_edge_field(edge_field_);
 }
 
 FrameTimes SceneRenderer::draw(const Camera& camera, std::span<const DrawItem> draws, double half_curvature,
                                RenderTarget& target) {
     pass_meshes_on();
+    pass_edge_field_on();
     settings_.half_curvature = half_curvature;
     return renderer_->draw(camera, draws, settings_, target);
 }

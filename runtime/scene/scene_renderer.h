@@ -53,14 +53,16 @@ public:
     const RendererOptions& renderer_options() const { return renderer_options_; }
 
 private:
-    SceneRenderer(const SceneRendererOptions& options, const MeshPool* meshes) : options_(options), meshes_(meshes) {}
+    SceneRenderer(const SceneRendererOptions& options, const Scene& scene) : options_(options), scene_(scene) {}
     Result<void> make_renderer(const Dataset& dataset, const MemoryPlan& plan);
 
     void pass_meshes_on();
+    void pass_edge_field_on();
 
     SceneRendererOptions options_;
-    const MeshPool* meshes_;              ///< the scene's; null: none
-    std::uint64_t meshes_passed_on_ = 0;  ///< MeshPool::written() of what the renderer has
+    const Scene& scene_;
+    std::uint64_t meshes_passed_on_ = 0;           ///< MeshPool::written() of what the renderer has
+    std::shared_ptr<const EdgeField> edge_field_;  ///< what the renderer has
     RendererOptions renderer_options_;
     std::unique_ptr<Renderer> renderer_;
     FrameSettings settings_;

@@ -10,20 +10,22 @@ constexpr std::chrono::milliseconds kLook{250};
 
 }  // namespace
 
-Result<OpenedStore> open_store(const std::string& path, const StoreOptions& options, int readers) {
+Result<OpenedStore> open_store(const std::string& path, const StoreOptions& options, const StoreReading& reading) {
     auto store = SqliteStore::open(path, options);
     if (!store) return store.error();
     OpenedStore opened{std::move(*store), {}};
-    for (int k = 0; k < readers; ++k) {
+    for (int k = 0; k < reading.readers; ++k) {
         auto reader = opened.store->open_reader();
         if (!reader) return reader.error();
         opened.readers.push_back(std::move(*reader));
     }
+    if (reading.edge_field)
+        opened.edge_field = EdgeField::read(*opened.store, edge_band_m(opened.store->dataset().lattice));
     return opened;
 }
 
-StoreWatch::StoreWatch(std::shared_ptr<const SqliteStore> store, int readers)
-    : latest_(std::move(store)), readers_(readers), thread_([this] { run(); }) {}
+StoreWatch::StoreWatch(std::shared_ptr<const SqliteStore> store, const StoreReading& reading)
+    : latest_(std::move(store)), reading_(reading), thread_([this] { run(); }) {}
 
 StoreWatch::~StoreWatch() {
     {
@@ -55,7 +57,7 @@ void StoreWatch::run() {
 
 void StoreWatch::look() {
     if (!latest_->has_changed()) return;
-    auto opened = open_store(latest_->path(), latest_->open_options(), readers_);
+    auto opened = open_store(latest_->path(), latest_->open_options(), reading_);
     // Changed again meanwhile: the readers may see more than the store says. Next time, then.
     if (opened && opened->store->has_changed()) return;
     std::optional<OpenedStore> old;  // closed after the lock is gone

@@ -11,24 +11,31 @@
 
 #include "common/store/sqlite_store.h"
 #include "runtime/paging/loader.h"
+#include "runtime/view/edge_field.h"
 
 namespace scree {
+
+/// What is wanted of a store that is opened.
+struct StoreReading {
+    int readers = 1;
+    bool edge_field = false;
+};
 
 /// A store as it was at one moment, with readers that were opened for it.
 struct OpenedStore {
     std::shared_ptr<const SqliteStore> store;
     Loader::Readers readers;
+    std::shared_ptr<const EdgeField> edge_field{};
 };
 
-/// Opens the store under `path` with so many readers. Waits while another program commits. Errors: those of
-/// SqliteStore.
-Result<OpenedStore> open_store(const std::string& path, const StoreOptions& options, int readers);
+/// Opens the store under `path`. Waits while another program commits. Errors: those of SqliteStore.
+Result<OpenedStore> open_store(const std::string& path, const StoreOptions& options, const StoreReading& reading);
 
 /// take() is for one thread, and never waits.
 class StoreWatch {
 public:
     /// Looks four times a second whether `store` has changed. What comes is opened with the same options.
-    StoreWatch(std::shared_ptr<const SqliteStore> store, int readers);
+    StoreWatch(std::shared_ptr<const SqliteStore> store, const StoreReading& reading);
     ~StoreWatch();
     StoreWatch(const StoreWatch&) = delete;
     StoreWatch& operator=(const StoreWatch&) = delete;
@@ -43,7 +50,7 @@ private:
     void look();
 
     std::shared_ptr<const SqliteStore> latest_;  // of the thread
-    const int readers_;
+    const StoreReading reading_;
     std::mutex mutex_;
     std::condition_variable stop_;
     bool stopping_ = false;

@@ -1,7 +1,8 @@
 // What the looks of a picture cost, and what they do against shimmer: samples a pixel, anisotropy, and soft ends, on a
 // store's overview and on a slow low flight. Every pose is drawn in all ways by turns; printed is the median CPU time
 // of a frame, all threads, which a busy machine changes less than the time by the clock.
-//     scree_look_bench STORE [FRAMES]
+//     scree_look_bench STORE [FRAMES [edge]]
+// edge: what soft ends cost alone, by turns with none.
 //
 // Shimmer: how much more the picture changes from frame to frame than it should. Both flights' differences from one
 // frame to the next are taken, of the picture and of a reference with 16 samples a pixel in an even grid, anisotropy
@@ -86,6 +87,8 @@ std::vector<Way> all_ways() {
     return ways;
 }
 
+std::vector<Way> edge_ways() { return {{"soft", 0, 1}, {"hard", 0, 1, false}, {"soft", 0, 1}, {"hard", 0, 1, false}}; }
+
 double light_of(std::uint8_t srgb) {
     const double c = srgb / 255.0;
     return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
@@ -116,8 +119,7 @@ public:
         must_do(scene_->start(renderers_));
     }
 
-    void cost(const std::string& view, const FlightPose& first, glm::dvec3 step) {
-        auto ways = all_ways();
+    void cost(const std::string& view, const FlightPose& first, glm::dvec3 step, std::vector<Way> ways) {
         for (int frame = -1; frame < frames_; ++frame) {
             const Camera camera = camera_of(first, static_cast<double>(frame) * step, kSide_px);
             for (Way& way : ways) {
@@ -200,7 +202,7 @@ private:
         SceneRenderer& renderer = renderers_.of(way.anisotropy);
         FrameSettings& settings = renderer.settings();
         settings = scenery(store_->dataset());
-        if (!way.soft) settings.edge_band_m = 0;
+        settings.soft_edge = way.soft;
         settings.wait_until_drawn = true;
         const double before = cpu_ms();
         renderer.draw(camera, frame.selection->to_render(0), frame.half_curvature, picture);
@@ -221,14 +223,17 @@ private:
 int main(int argc, char** argv) {
     using namespace scree;
     if (argc < 2) {
-        fmt::print(stderr, "scree_look_bench STORE [FRAMES]\n");
+        fmt::print(stderr, "scree_look_bench STORE [FRAMES [edge]]\n");
         return 2;
     }
     Bench bench(argv[1], argc > 2 ? std::atoi(argv[2]) : 20);
     const FlightPose low = bench.low(), above = bench.above();
     const glm::dvec3 ahead = glm::normalize(low.look - low.eye) * glm::dvec3(kStep_m, kStep_m, 0);
-    bench.cost("low flight", low, ahead);
-    bench.cost("overview", above, ahead);
+    const bool edge_alone = argc > 3 && std::string(argv[3]) == "edge";
+    const std::vector<Way> ways = edge_alone ? edge_ways() : all_ways();
+    bench.cost("low flight", low, ahead, ways);
+    bench.cost("overview", above, ahead, ways);
+    if (edge_alone) return 0;
     bench.shimmer("low flight", low, ahead);
     bench.shimmer("overview", above, 5.0 * ahead);
     return 0;

@@ -40,9 +40,9 @@ const int kRayFromScreenUniform = 7;     // mat3: {x, y, 1} on the screen, -1..1
 const int kHalfCurvatureUniform = 8;     // float: 1 / (2 R), 1/m; 0: flat
 const int kTintUniform = 9;              // vec2: share of a surface's range of heights, n * x + y
 const int kLineUniform = 10;             // vec4: the picture's size in pixels, half a line's width, share of its opacity
-const int kBoxUniform = 11;              // vec4: the data's west, south, east and north from the eye, m
-const int kBandUniform = 12;             // float: 1/m
-const int kTintColoursUniform = 13;      // vec3[kTintColours]: a surface's colours over its range of heights, linear
+const int kEdgeFieldUniform = 11;        // vec4: place in an EdgeField's texture, relative_m.xy * xy + zw
+const int kTintColoursUniform = 12;      // vec3[kTintColours]: a surface's colours over its range of heights, linear
 
 const int kTintColours = 32;
 const int kImageryTextureUnit = 0;  // and those after it, in blended draws
+const int kEdgeFieldUnit = 0;       // in draws of their own

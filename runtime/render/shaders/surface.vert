@@ -6,6 +6,9 @@ layout(location = kSurfaceNormalAttribute) in vec2 normal_across;
 layout(location = kClipFromRelativeUniform) uniform mat4 clip_from_relative;
 layout(location = kTintUniform) uniform vec2 tint;  // share of the heights' range: n * x + y
 
+// Drawn once more where the ground ends.
+invariant gl_Position;
+
 out vec3 relative_m;
 out float haze_density;  // mean over the ray, as in terrain.vert
 out float height_share;

@@ -66,6 +66,25 @@ std::vector<std::uint8_t> half_absent_texture() {
     return chain;
 }
 
+/// Green where `has(u, v)`, alpha 0 elsewhere, in every mip; u, v in 0 .. 1 from the north-west corner.
+template <class Has>
+std::vector<std::uint8_t> texture_where(int size_log2, const Has& has) {
+    std::vector<std::uint8_t> chain;
+    for (int mip = size_log2; mip >= 0; --mip) {
+        const int size = 1 << (size_log2 - mip), blocks = std::max(size / 4, 1);
+        for (int row = 0; row < blocks; ++row)
+            for (int column = 0; column < blocks; ++column) {
+                std::uint16_t absent = 0;
+                for (int k = 0; k < 16; ++k)
+                    if (!has((4 * column + k % 4 + 0.5) / size, (4 * row + k / 4 + 0.5) / size))
+                        absent = static_cast<std::uint16_t>(absent | (1u << k));
+                const auto block = bc1_block(kGreen565, kGreen565, 0, absent);
+                chain.insert(chain.end(), block.begin(), block.end());
+            }
+    }
+    return chain;
+}
+
 struct Picture {
     std::vector<std::uint8_t> rgb;
     FrameTimes times;
@@ -92,10 +111,10 @@ protected:
             renderer_->upload_height(slot, flat_slot(options.lattice.tile_cells_log2, 0));
     }
 
-    void make_small(int slots = 4, int texture_slots = 4) {
+    void make_small(int slots = 4, int texture_slots = 4, int texture_size_log2 = kTextureLog2) {
         RendererOptions options;
         options.lattice = small_world();
-        options.texture_size_log2 = kTextureLog2;
+        options.texture_size_log2 = texture_size_log2;
         options.height_slots = slots;
         options.texture_slots = texture_slots;
         options.max_draws = 64;
@@ -111,6 +130,21 @@ protected:
         picture.rgb = target->read_pixels();
         depth_ = target->read_depth();
         return picture;
+    }
+
+    /// A field of 256 cells a side of the small world, where `has_ground` (metres from the north-west corner).
+    template <class Has>
+    void give_field(const Has& has_ground, double band_m) {
+        const Lattice lattice = small_world();
+        const auto shape = EdgeField::shape_of(lattice, 8);
+        std::vector<std::uint8_t> present;
+        const double cell_m = shape.cell_side * lattice.spacing_m;
+        for (std::int64_t y = 0; y < shape.rows; ++y)
+            for (std::int64_t x = 0; x < shape.columns; ++x)
+                present.push_back(
+                    has_ground((static_cast<double>(x) + 0.5) * cell_m, (static_cast<double>(y) + 0.5) * cell_m) ? 1
+                                                                                                                 : 0);
+        ASSERT_TRUE(renderer_->set_edge_field(std::make_shared<EdgeField>(shape, present, band_m / cell_m)).ok());
     }
 
     /// From `height_m` over the middle straight down, north up; the world just fills the picture at 45 degrees and 386
@@ -451,7 +485,7 @@ TEST_F(RendererTest, TheEndOfTheDataDissolvesIntoTheSky) {
     FrameSettings settings;
     settings.haze_distance_m = 5'000;
     const Picture sky = draw(camera, {}, settings), hard = draw(camera, {DrawItem{}}, settings);
-    settings.edge_band_m = 32;
+    give_field([](double, double) { return true; }, 32);
     std::vector<DrawItem> quarters(4);
     for (int k = 0; k < 4; ++k) quarters[static_cast<std::size_t>(k)].tile = child_of({0, 0, 0}, k);
     quarters[2].neighbour_textures[0] = 1;  // drawn as a ring and an inner part
@@ -468,7 +502,7 @@ TEST_F(RendererTest, TheEndOfTheDataDissolvesIntoTheSky) {
                     if (inside_m > 34) {
                         EXPECT_EQ(soft.at(px, py), hard.at(px, py)) << px << ' ' << py;
                     }
-                    if (inside_m < 2) {
+                    if (inside_m < 1.5) {
                         for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(soft.at(px, py)[c], sky.at(px, py)[c], 3);
                     }
                 }
@@ -482,8 +516,59 @@ TEST_F(RendererTest, TheEndOfTheDataDissolvesIntoTheSky) {
     settings.magenta_background = true;
     const Picture magenta = draw(camera, {DrawItem{}}, settings);
     EXPECT_EQ(magenta.times.edge_draws, 0u);
-    settings.edge_band_m = 0;
+    settings.soft_edge = false;
     EXPECT_EQ(magenta.rgb, draw(camera, {DrawItem{}}, settings).rgb);
+    settings.magenta_background = false;
+    EXPECT_EQ(hard.rgb, draw(camera, {DrawItem{}}, settings).rgb);
+}
+
+// A round void in the middle and a slanted border, by texels that are absent and a field that knows them.
+TEST_F(RendererTest, VoidsAndSlantedBordersDissolveLikewise) {
+    make_small(1, 1, 8);
+    // Metres from the north-west corner.
+    const auto void_m = [](double x, double y) { return std::hypot(x - 160, y - 160) - 50; };
+    const auto slant_m = [](double x, double y) { return (x + 0.4 * y - 120) / std::hypot(1, 0.4); };
+    const auto has_ground = [&](double x, double y) { return void_m(x, y) > 0 && slant_m(x, y) > 0; };
+    renderer_->upload_texture(0, texture_where(8, [&](double u, double v) { return has_ground(320 * u, 320 * v); }));
+    const Camera camera = from_above(380);
+    FrameSettings settings;
+    settings.haze_distance_m = 5'000;
+    const Picture hard = draw(camera, {DrawItem{}}, settings);
+    const auto sky = draw(camera, {}, settings);
+    give_field(has_ground, 32);
+    const Picture soft = draw(camera, {DrawItem{}}, settings);
+    EXPECT_GT(soft.times.edge_draws, 0u);
+    const double m_per_px = 2 * std::tan(glm::radians(22.5)) * 380 / kSize_px;
+    // Away from the void due south, and from the slant due east; a texel is 1.25 m.
+    for (const bool of_void : {true, false}) {
+        double last_share = 0, least_share = 1;
+        for (int k = 0; k < kSize_px / 2; ++k) {
+            const int px = of_void ? kSize_px / 2 : k, py = of_void ? kSize_px / 2 + k : kSize_px / 4;
+            const double x = 160 + (px + 0.5 - kSize_px / 2) * m_per_px, y = 160 + (py + 0.5 - kSize_px / 2) * m_per_px;
+            const double inside_m = of_void ? void_m(x, y) : slant_m(x, y);
+            const double to_others_m = std::min({x, y, 320 - x, 320 - y, of_void ? slant_m(x, y) : void_m(x, y)});
+            if (to_others_m < 36) continue;
+            const double share =
+                (soft.at(px, py)[1] - sky.at(px, py)[1]) / static_cast<double>(255 - sky.at(px, py)[1]);
+            if (inside_m < -4) {
+                EXPECT_EQ(soft.at(px, py), sky.at(px, py)) << inside_m;
+            }
+            if (inside_m > -4 && inside_m < 1) {
+                EXPECT_LT(share, 0.03) << inside_m;
+            }
+            if (inside_m > 36) {
+                EXPECT_EQ(soft.at(px, py), hard.at(px, py)) << inside_m;
+            }
+            if (inside_m > 14 && inside_m < 18) {
+                EXPECT_NEAR(share, 0.5, 0.25) << inside_m;
+            }
+            EXPECT_GE(share, last_share - 0.03) << of_void << ' ' << inside_m;
+            last_share = share;
+            least_share = std::min(least_share, share);
+        }
+        EXPECT_GT(last_share, 0.95);
+        EXPECT_LT(least_share, 0.03);
+    }
 }
 
 TEST_F(RendererTest, DebugViewsDrawWhatTheySay) {

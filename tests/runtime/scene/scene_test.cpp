@@ -341,6 +341,62 @@ TEST(SceneThatFollows, KeepsItsExaggerationThroughUpdates) {
     EXPECT_TRUE(scene.complete({&camera, 1}).ok());
 }
 
+/// A texture with nothing in it.
+TextureTile empty_texture(int size_log2) {
+    TextureTile tile;
+    tile.blocks.assign(bc1_chain_bytes(size_log2), 0xff);
+    return tile;
+}
+
+// In place, and with memory divided anew.
+TEST(SceneThatFollows, SeesWhereTheGroundEndsAfterAnUpdate) {
+    const StoredTerrain stored(hills());
+    SceneOptions options = small_options();
+    options.follow = true;
+    Staged staged(stored, options);
+    Scene& scene = *staged.scene;
+    const Camera camera = stored.camera(200, 512);
+    const TileId lost{1, 1, 1};
+    const auto in_lost = [&] {
+        const EdgeField& field = *scene.edge_field();
+        const EdgeField::Shape& shape = field.shape();
+        return field.values()[static_cast<std::size_t>(shape.rows * 3 / 4 * shape.columns + shape.columns * 3 / 4)];
+    };
+    EXPECT_EQ(in_lost(), EdgeField::kFar);
+    Dataset next = stored.store().dataset();
+    for (const double factor : {1.0, 0.5}) {
+        next.height_quantum_m *= factor;
+        next.attribution += "a";
+        auto writer = SqliteStoreWriter::amend(stored.store().path());
+        ASSERT_TRUE(writer.ok());
+        for (const TileId id : stored.terrain().textures()) {
+            if (id.level < 1 || ancestor_at(id, 1) != lost) continue;
+            TextureTile texture = factor == 1 ? empty_texture(next.texture_size_log2) : stored.terrain().texture(id);
+            texture.child_mask = stored.terrain().texture(id).child_mask;
+            ASSERT_TRUE((*writer)
+                            ->put(TileKind::texture, *tile_key(next.lattice, id), static_cast<int>(TextureCodec::raw),
+                                  encode_texture_tile(texture, next.texture_size_log2, TextureCodec::raw))
+                            .ok());
+        }
+        ASSERT_TRUE((*writer)->finish(next).ok());
+        advance_until(scene, camera, [&] { return scene.dataset().attribution == next.attribution; });
+        EXPECT_EQ(in_lost(), factor == 1 ? 0 : EdgeField::kFar);
+    }
+    EXPECT_EQ(scene.updates(), 2);
+}
+
+TEST_F(SceneOfHills, KeepsNoEdgeFieldThatNobodyWants) {
+    SceneOptions options = small_options();
+    options.budget_bytes *= 8;  // room for every tile, so that the plans differ by the field alone
+    const Staged soft(*stored_, options);
+    options.soft_edge = false;
+    const Staged hard(*stored_, options);
+    EXPECT_NE(soft.scene->edge_field(), nullptr);
+    EXPECT_EQ(hard.scene->edge_field(), nullptr);
+    EXPECT_EQ(soft.scene->memory().resident_bytes - hard.scene->memory().resident_bytes,
+              EdgeField::bytes(soft.scene->dataset(), false));
+}
+
 struct Flown {
     int stand_ins = 0;
     std::int64_t prefetched = 0;
