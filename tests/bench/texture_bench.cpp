@@ -12,7 +12,7 @@
 
 #include "common/store/sqlite_store.h"
 #include "common/store/texture_codec.h"
-#include "tools/pyramid/texture_filter.h"
+#include "tools/pyramid/texture_filter_kernel.h"
 
 namespace {
 
@@ -42,12 +42,19 @@ void measure_filter(const char* name, const std::function<std::uint8_t(std::mt19
             (*row)[i] = i % 4 == 3 ? alpha(random) : static_cast<std::uint8_t>(random());
         }
     }
-    const double seconds = best_seconds([&] {
-        for (int k = 0; k < kRows; ++k) {
-            scree::downsample_rgba_row(upper.data(), lower.data(), kWidth / 2, out.data());
-        }
-    });
-    fmt::print("filter, {}: {:.0f} MPix/s of the finer level\n", name, kWidth * 2 * kRows / seconds * 1e-6);
+    const auto measure = [&](const char* kernel, scree::FilterRow* row, bool runs_here) {
+        if (!runs_here) return;
+        const double seconds = best_seconds([&] {
+            for (int k = 0; k < kRows; ++k) {
+                row(scree::filter_tables(), upper.data(), lower.data(), kWidth / 2, out.data());
+            }
+        });
+        fmt::print("filter, {}, {}: {:.0f} MPix/s of the finer level\n", name, kernel,
+                   kWidth * 2 * kRows / seconds * 1e-6);
+    };
+    measure("scalar", scree::filter_row_scalar, true);
+    measure("AVX2", scree::filter_row_avx2, scree::filter_row_avx2_runs_here());
+    measure("AVX-512", scree::filter_row_avx512, scree::filter_row_avx512_runs_here());
 }
 
 /// Encodes and decodes again up to 1000 tiles, evenly spread over the store.

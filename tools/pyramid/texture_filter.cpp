@@ -38,6 +38,7 @@ const FilterTables& filter_tables() {
     return instance;
 }
 
+bool filter_row_avx2_runs_here() { return __builtin_cpu_supports("avx2") != 0; }
 bool filter_row_avx512_runs_here() {
     return __builtin_cpu_supports("avx512bw") != 0 && __builtin_cpu_supports("avx512vbmi") != 0;
 }
@@ -69,7 +70,9 @@ void filter_row_scalar(const FilterTables& t, const std::uint8_t* upper, const s
 }
 
 void downsample_rgba_row(const std::uint8_t* upper, const std::uint8_t* lower, std::int64_t count, std::uint8_t* out) {
-    static FilterRow* const filter = filter_row_avx512_runs_here() ? filter_row_avx512 : filter_row_scalar;
+    static FilterRow* const filter = filter_row_avx512_runs_here() ? filter_row_avx512
+                                     : filter_row_avx2_runs_here() ? filter_row_avx2
+                                                                   : filter_row_scalar;
     filter(filter_tables(), upper, lower, count, out);
 }
 

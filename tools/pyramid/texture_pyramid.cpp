@@ -17,9 +17,9 @@
 namespace scree {
 namespace {
 
-constexpr int kRowsPerPush = 16;              // 16 rows of 64 K texels are 4 MB
-constexpr std::int64_t kChunkTexels = 2048;   // of a row, for one task: 32 K texels of a push, about 50 us
-constexpr std::int64_t kTilesTogether = 32;   // that wait for the store packed, 30 KB each
+constexpr int kRowsPerPush = 8;              // 16 rows of 64 K texels are 4 MB
+constexpr std::int64_t kChunkTexels = 2048;  // of a row, for one task: 32 K texels of a push, about 50 us
+constexpr std::int64_t kTilesTogether = 32;  // that wait for the store packed, 30 KB each
 
 using Runs = TextureDepth::Runs;
 
@@ -58,7 +58,7 @@ struct TexturePyramid::Impl {
     TexturePyramidJob job;
     std::int64_t size = 256;
     Extent extent;
-    std::vector<Level> levels;         // deepest first
+    std::vector<Level> levels;          // deepest first
     std::vector<std::uint32_t> second;  // the other buffer of the deepest level's rows
     int buffer = 0;                     // the one that stands in levels.front().rows
     std::unordered_set<TileId, TileIdHash> tiles;

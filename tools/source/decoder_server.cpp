@@ -194,18 +194,20 @@ private:
         }
     }
 
-    Answer done() const {
+    // The band is shared with the program, which counts it.
+    Answer done() {
         Answer answer;
         const rusage usage = usage_of(RUSAGE_SELF);
+        own_rss_ = std::max(own_rss_, rss_of(usage) - first_rss_ - shared_.bytes());
         answer.kind = Answer::Kind::done;
         answer.cpu_seconds = seconds_of(usage);
-        answer.rss_bytes = rss_of(usage) - first_rss_;
+        answer.rss_bytes = own_rss_;
         answer.server_cpu_seconds = seconds_of(server_);
         answer.server_rss_bytes = rss_of(server_);
         return answer;
     }
 
-    bool answer(const Error& error) const {
+    bool answer(const Error& error) {
         Answer answer = done();
         answer.kind = Answer::Kind::error;
         answer.code = static_cast<std::int32_t>(error.code);
@@ -217,7 +219,7 @@ private:
     rusage server_;
     OpenRequest request_;
     std::string path_;
-    std::int64_t first_rss_ = 0;
+    std::int64_t first_rss_ = 0, own_rss_ = 0;
     std::unique_ptr<PixelDecoder> decoder_;
     SharedMemory shared_;
 };

@@ -99,8 +99,23 @@ TEST(TextureFilter, ARowIsFilteredTexelByTexel) {
     for (std::size_t c = 0; c < 4; ++c) EXPECT_EQ(out[4 * 33 + c], 77) << "wrote past its end";
 }
 
-TEST(TextureFilter, TheVectorRowGivesTheBytesOfTheScalarOne) {
-    if (!filter_row_avx512_runs_here()) GTEST_SKIP() << "this processor has no AVX-512 VBMI";
+struct VectorRow {
+    const char* name;
+    FilterRow* row;
+    bool runs_here;
+};
+class VectorRows : public testing::TestWithParam<VectorRow> {
+protected:
+    void SetUp() override {
+        if (!GetParam().runs_here) GTEST_SKIP() << "this processor has no " << GetParam().name;
+    }
+};
+INSTANTIATE_TEST_SUITE_P(TextureFilter, VectorRows,
+                         testing::Values(VectorRow{"AVX2", filter_row_avx2, filter_row_avx2_runs_here()},
+                                         VectorRow{"AVX-512 VBMI", filter_row_avx512, filter_row_avx512_runs_here()}),
+                         [](const auto& tested) { return tested.index == 0 ? "Avx2" : "Avx512"; });
+
+TEST_P(VectorRows, GiveTheBytesOfTheScalarOne) {
     SCREE_TRACE_SEED();
     test::Random random(test::seed());
     for (std::size_t count = 0; count <= 140; ++count) {
@@ -115,22 +130,20 @@ TEST(TextureFilter, TheVectorRowGivesTheBytesOfTheScalarOne) {
                 }
             filter_row_scalar(filter_tables(), upper.data(), lower.data(), static_cast<std::int64_t>(count),
                               want.data());
-            filter_row_avx512(filter_tables(), upper.data(), lower.data(), static_cast<std::int64_t>(count),
-                              got.data());
+            GetParam().row(filter_tables(), upper.data(), lower.data(), static_cast<std::int64_t>(count), got.data());
             ASSERT_EQ(got, want) << count << " texels, kind " << kind;
         }
     }
 }
 
-TEST(TextureFilter, TheVectorRowGivesEveryMeanAsTheScalarOne) {
-    if (!filter_row_avx512_runs_here()) GTEST_SKIP() << "this processor has no AVX-512 VBMI";
+TEST_P(VectorRows, GiveEveryMeanAsTheScalarOne) {
     // All pairs of levels: every entry of the way there and thousands of the way back.
     std::vector<std::uint8_t> upper(8 * 256), want(4 * 256), got(4 * 256);
     for (int a = 0; a < 256; ++a) {
         for (std::size_t i = 0; i < upper.size(); ++i)
             upper[i] = static_cast<std::uint8_t>(i % 4 == 3 ? 255 : i % 8 < 4 ? a : static_cast<int>(i / 8));
         filter_row_scalar(filter_tables(), upper.data(), upper.data(), 256, want.data());
-        filter_row_avx512(filter_tables(), upper.data(), upper.data(), 256, got.data());
+        GetParam().row(filter_tables(), upper.data(), upper.data(), 256, got.data());
         ASSERT_EQ(got, want) << a;
     }
 }
