@@ -190,8 +190,8 @@ Result<void> write_report(const AuditResult& result, const AuditFacts& facts, co
 }
 
 Result<bool> run_blocks(const ViewOptions& o, const AuditOptions& a) {
-    for (const auto& [given, option] : {std::pair(a.moving, "--moving"), std::pair(!a.against.empty(), "--against"),
-                                        std::pair(!a.report.empty(), "--report")})
+    for (const auto& [given, option] :
+         {std::pair(!a.against.empty(), "--against"), std::pair(!a.report.empty(), "--report")})
         if (auto ok = refuse_with_blocks(given, option); !ok) return ok.error();
     auto store = open_store(o);
     if (!store) return store.error();

@@ -55,7 +55,7 @@ Json shot_report(const BlockScene& scene, const BlockFrame& frame, const FlightP
                    {"dike_triangles", frame.dike_triangles}};
     if (const auto promise_px = scene.promise_px()) report["max_bound_px"] = *promise_px;
     report["tau_effective_px"] = scene.tau_px();
-    report["curvature"] = false;
+    report["curvature"] = scene.half_curvature() > 0;
     report["eye"] = {pose.eye.x, pose.eye.y, pose.eye.z};
     report["look"] = {pose.look.x, pose.look.y, pose.look.z};
     describe(report, scene);
@@ -63,27 +63,30 @@ Json shot_report(const BlockScene& scene, const BlockFrame& frame, const FlightP
 }
 
 struct FlightLog {
-    Series frame_ms, select_ms, triangles, blocks, strips, tau;
-    std::int64_t drawn = 0, reused = 0, meshes_made = 0, strips_made = 0, holes = 0;
+    Series frame_ms, select_ms, triangles, blocks, strips, tau, bound;
+    Series settled_triangles, settled_bound;
+    std::int64_t drawn = 0, reused = 0, meshes_made = 0, strips_made = 0, upload_bytes = 0, holes = 0;
     double max_bound_px = 0;
     std::string csv =
-        "frame,frame_ms,select_ms,triangles,blocks,strips,reused,meshes_made,tau_effective,rss_bytes\n";
+        "frame,frame_ms,select_ms,triangles,blocks,strips,reused,meshes_made,upload_bytes,tau_effective,rss_bytes\n";
 
-    void add(std::size_t k, double ms, const BlockFrame& frame, const BlockScene& scene) {
+    void add(std::size_t k, double ms, const BlockFrame& frame, const FrameTimes& times, const BlockScene& scene) {
         frame_ms.add(ms);
         select_ms.add(frame.lod_ms);
         triangles.add(static_cast<double>(frame.triangles()));
         blocks.add(static_cast<double>(frame.blocks.size()));
         strips.add(static_cast<double>(frame.strips.size()));
         tau.add(scene.tau_px());
+        bound.add(scene.promise_px().value_or(0));
         drawn += static_cast<std::int64_t>(frame.blocks.size());
         reused += frame.reused;
         meshes_made += frame.meshes_made;
         strips_made += frame.strips_made;
+        upload_bytes += static_cast<std::int64_t>(times.uploaded_bytes);
         max_bound_px = std::max(max_bound_px, scene.promise_px().value_or(0));
-        csv += fmt::format("{},{:.3f},{:.4f},{},{},{},{},{},{:.4f},{}\n", k, ms, frame.lod_ms, frame.triangles(),
-                           frame.blocks.size(), frame.strips.size(), frame.reused, frame.meshes_made, scene.tau_px(),
-                           resident_bytes());
+        csv += fmt::format("{},{:.3f},{:.4f},{},{},{},{},{},{},{:.4f},{}\n", k, ms, frame.lod_ms, frame.triangles(),
+                           frame.blocks.size(), frame.strips.size(), frame.reused, frame.meshes_made,
+                           times.uploaded_bytes, scene.tau_px(), resident_bytes());
     }
 };
 
@@ -97,14 +100,39 @@ Result<FlightLog> fly(const ViewOptions& o, const FlightPath& path, const BlockF
         if (!camera) return camera.error();
         const auto start = Clock::now();
         const BlockFrame& frame = scene.select(*camera);
-        if (auto times = display.draw(*camera); !times) return times.error();
+        const FrameTimes times = display.draw(*camera);
         display.show();
         const double ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-        log.add(k, ms, frame, scene);
+        log.add(k, ms, frame, times, scene);
         log.holes += scene.count_holes(*camera);
         if (f.fps > 0) scene.set_tau_px(governor.next(ms));
     }
     return log;
+}
+
+// The same poses with nothing reused, at the tolerance that was asked for, not drawn.
+Result<void> settle(const ViewOptions& o, const FlightPath& path, BlockScene& scene, FlightLog& log) {
+    scene.set_tau_px(o.tau_px);
+    for (const FlightPose& pose : path) {
+        auto camera = camera_of(pose, o);
+        if (!camera) return camera.error();
+        scene.forget();
+        log.settled_triangles.add(static_cast<double>(scene.select(*camera).triangles()));
+        log.settled_bound.add(scene.promise_px() ? o.tau_px : 0);
+    }
+    return {};
+}
+
+Json settled_report(const FlightLog& log) {
+    double least_share = 1;
+    for (std::size_t k = 0; k < log.triangles.values.size(); ++k)
+        if (log.settled_triangles.values[k] > 0)
+            least_share = std::min(least_share, log.triangles.values[k] / log.settled_triangles.values[k]);
+    const double settled_px = log.settled_bound.mean();
+    return {{"error_integral_px", settled_px},
+            {"error_integral_ratio", settled_px > 0 ? log.bound.mean() / settled_px : 1},
+            {"triangles", log.settled_triangles.mean_max()},
+            {"least_triangle_share", least_share}};
 }
 
 Json flight_report(const FlightLog& log, const BlockScene& scene, const ViewOptions& o, const std::string& renderer) {
@@ -117,11 +145,13 @@ Json flight_report(const FlightLog& log, const BlockScene& scene, const ViewOpti
                    {"reused_share", share(log.reused, log.drawn)},
                    {"meshes_made", log.meshes_made},
                    {"strips_made", log.strips_made},
+                   {"upload_bytes", log.upload_bytes},
                    {"budget_bytes", o.budget_bytes},
                    {"peak_resident_bytes", scene.resident_bytes()},
                    {"peak_rss_bytes", process_usage().peak_rss_bytes},
                    {"holes", log.holes}};
     if (scene.promise_px()) report["max_bound_px"] = log.max_bound_px;
+    if (!log.settled_triangles.values.empty()) report["settled"] = settled_report(log);
     report["tau_effective_px"] = log.tau.mean_max();
     report["tau_px"] = o.tau_px;
     report["size_px"] = {o.width_px, o.height_px};
@@ -152,7 +182,7 @@ struct BlockAudit {
     void look(BlockScene& scene, const Camera& camera) {
         const BlockFrame& frame = scene.select(camera);
         const double limit_px = scene.promise_px().value_or(scene.tau_px()) + kRoundingPx;
-        judge_frame(scene.world(), camera, frame, limit_px, truth);
+        judge_frame(scene.world(), camera, frame, limit_px, truth, scene.half_curvature());
         const CrackReport found = scene.count_cracks();
         cracks.edges += found.edges;
         cracks.open_edges += found.open_edges;
@@ -232,10 +262,12 @@ Result<void> shoot_blocks(const ViewOptions& o, const TileStore& store, const Bl
     auto camera = camera_of(pose, o);
     if (!camera) return camera.error();
     const BlockFrame& frame = (*scene)->select(*camera);
-    if (auto times = (*display)->draw(*camera); !times) return times.error();
+    (*display)->draw(*camera);
     if (auto ok = write_png(shot.out, o.width_px, o.height_px, (*display)->target().read_pixels()); !ok) return ok;
     if (!shot.mesh_file.empty())
-        if (auto ok = write_ply(shot.mesh_file, d, (*scene)->drawn_mesh(), camera->eye, 0); !ok) return ok;
+        if (auto ok = write_ply(shot.mesh_file, d, (*scene)->drawn_mesh(), camera->eye, (*scene)->half_curvature());
+            !ok)
+            return ok;
     if (o.json != "-")
         fmt::print("{}: {} triangles in {} blocks and {} strips, {}{}\n", shot.out, frame.triangles(),
                    frame.blocks.size(), frame.strips.size(), promise_text((*scene)->promise_px()),
@@ -255,6 +287,8 @@ Result<void> fly_blocks(const ViewOptions& o, const TileStore& store, const Flig
     (*display)->frame_settings().wait_until_drawn = true;
     auto log = fly(o, path, f, **scene, **display);
     if (!log) return log.error();
+    if (f.settled)
+        if (auto ok = settle(o, path, **scene, *log); !ok) return ok;
     if (!f.csv.empty())
         if (auto ok = write_text(f.csv, log->csv); !ok) return ok;
     if (!f.last_frame.empty())

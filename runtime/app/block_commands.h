@@ -27,6 +27,7 @@ Result<void> shoot_blocks(const ViewOptions& options, const TileStore& store, co
 struct BlockFlight {
     bool headless = false;
     double fps = 0, tau_most_px = 16;  ///< 0: tau is kept
+    bool settled = false;              ///< afterwards the same poses anew, at the tolerance asked for
     std::string csv, last_frame;       ///< files; empty: none
 };
 Result<void> fly_blocks(const ViewOptions& options, const TileStore& store, const FlightPath& path,

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 namespace scree {
@@ -60,7 +61,7 @@ Result<std::unique_ptr<SurfaceRenderer>> make_renderer(const BlockScene& scene) 
                             [](const SurfaceVertex& a, const SurfaceVertex& b) { return a.height_n < b.height_n; });
     options.low_n = static_cast<double>(low->height_n);
     options.high_n = static_cast<double>(high->height_n);
-    auto renderer = SurfaceRenderer::create(options, vertices);
+    auto renderer = SurfaceRenderer::create(options, vertices, scene.rooms());
     if (!renderer) return renderer;
     if (auto ok = (*renderer)->set_edge_field(scene.edge_field()); !ok) return ok.error();
     return renderer;
@@ -81,22 +82,21 @@ Result<std::unique_ptr<BlockDisplay>> BlockDisplay::create(const BlockScene& sce
     display->renderer_ = std::move(*renderer);
     if (auto ok = display->resize(o.width_px, o.height_px); !ok) return ok.error();
     display->settings_ = scenery(scene.dataset());
-    if (auto ok = display->warm_up(); !ok) return ok.error();
+    display->warm_up();
     return display;
 }
 
 // Drivers that compile at the first draw do so now.
-Result<void> BlockDisplay::warm_up() {
+void BlockDisplay::warm_up() {
     Camera camera;
     camera.width_px = target_->width_px();
     camera.height_px = target_->height_px();
     const std::array<std::uint32_t, 3> triangle{0, 1, 2};
-    const std::array<std::span<const std::uint32_t>, 1> pieces{triangle};
+    // A version that its block never comes to: the block is sent when it is drawn.
+    const std::array<SurfacePiece, 1> pieces{{{0, std::numeric_limits<std::uint32_t>::max(), triangle}}};
     FrameSettings settings = settings_;
     settings.wait_until_drawn = true;
-    auto times = renderer_->draw(camera, pieces, 1, settings, *target_);
-    if (!times) return times.error();
-    return {};
+    renderer_->draw(camera, pieces, settings, *target_);
 }
 
 Result<void> BlockDisplay::change_to(const BlockScene& scene) {
@@ -119,8 +119,9 @@ Result<void> BlockDisplay::resize(int width_px, int height_px) {
     return {};
 }
 
-Result<FrameTimes> BlockDisplay::draw(const Camera& camera) {
-    return renderer_->draw(camera, scene_->pieces(), scene_->pieces_at_end(), settings_, *target_);
+FrameTimes BlockDisplay::draw(const Camera& camera) {
+    settings_.half_curvature = scene_->half_curvature();
+    return renderer_->draw(camera, scene_->pieces(), settings_, *target_);
 }
 
 void BlockDisplay::show() {

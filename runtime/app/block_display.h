@@ -23,12 +23,12 @@ public:
     Result<void> change_to(const BlockScene& scene);
     Result<void> resize(int width_px, int height_px);
     /// What the scene has last selected.
-    Result<FrameTimes> draw(const Camera& camera);
+    FrameTimes draw(const Camera& camera);
     void show();  ///< in the window, where there is one
 
 private:
     explicit BlockDisplay(const BlockScene& scene) : scene_(&scene) {}
-    Result<void> warm_up();
+    void warm_up();
 
     const BlockScene* scene_;
     std::unique_ptr<GlContext> context_;  // goes last

@@ -4,14 +4,13 @@
 #include <cmath>
 #include <utility>
 
+#include "runtime/lod/cut.h"
+#include "runtime/view/curvature.h"
 #include "runtime/view/frustum.h"
 
 namespace scree {
 
 Result<std::unique_ptr<BlockScene>> BlockScene::open(const TileStore& store, const SceneOptions& options) {
-    if (options.curvature == Curvature::on)
-        return Error{ErrorCode::usage,
-                     "--curvature on with --cracks dike: blocks are drawn flat, so nothing would be lowered"};
     auto raster = read_height_raster(store, options.budget_bytes, kBytesPerSample);
     if (!raster) return raster.error();
     auto world = BlockWorld::make(*raster);
@@ -22,6 +21,7 @@ Result<std::unique_ptr<BlockScene>> BlockScene::open(const TileStore& store, con
 BlockScene::BlockScene(const Dataset& dataset, const SceneOptions& options, BlockWorld world)
     : dataset_(dataset),
       lod_(options.lod),
+      curvature_(options.curvature),
       rules_(block_rules(options.lod, options.tau_px)),
       world_(std::move(world)),
       drawn_(static_cast<std::size_t>(world_.block_count())),
@@ -48,23 +48,6 @@ void BlockScene::make_edge_field() {
 
 bool BlockScene::is_at_end(int block) const { return at_end_[static_cast<std::size_t>(block)] != 0; }
 
-// With whether it reaches into the band: a strip or a quad where one of its blocks does.
-template <class Take>
-void BlockScene::for_each_piece(const BlockFrame& frame, const Take& take) const {
-    const auto block_of = [this](std::uint32_t vertex) {
-        return static_cast<int>(vertex / world_.vertices_per_block());
-    };
-    for (const std::int32_t block : frame.blocks) take(world_.mesh(block), is_at_end(block));
-    for (const std::int32_t strip : frame.strips) {
-        const auto sides = world_.sides(strip);
-        take(world_.strip_mesh(strip), is_at_end(sides.a) || is_at_end(sides.b));
-    }
-    for (const std::int32_t quad : frame.quads) {
-        const auto mesh = world_.quad_mesh(quad);
-        take(mesh, std::any_of(mesh.begin(), mesh.end(), [&](std::uint32_t v) { return is_at_end(block_of(v)); }));
-    }
-}
-
 std::int64_t BlockScene::resident_bytes() const { return std::int64_t{world_.vertex_count()} * kBytesPerSample; }
 
 std::optional<double> BlockScene::promise_px() const {
@@ -73,17 +56,39 @@ std::optional<double> BlockScene::promise_px() const {
 }
 
 const BlockFrame& BlockScene::select(const Camera& camera) {
+    rules_.half_curvature = scree::half_curvature(curvature_, dataset_, camera);
     const BlockFrame& frame = world_.select(camera, rules_);
     std::fill(drawn_.begin(), drawn_.end(), std::uint8_t{0});
     pieces_.clear();
-    for (const std::int32_t block : frame.blocks) drawn_[static_cast<std::size_t>(block)] = 1;
-    for (const bool last : {false, true})
-        for_each_piece(frame, [&](std::span<const std::uint32_t> mesh, bool at_end) {
-            if (at_end == last) pieces_.push_back(mesh);
+    for (const std::int32_t block : frame.blocks) {
+        drawn_[static_cast<std::size_t>(block)] = 1;
+        pieces_.push_back(
+            {static_cast<std::uint32_t>(block), world_.mesh_version(block), world_.mesh(block), is_at_end(block)});
+    }
+    const auto first_strip = static_cast<std::uint32_t>(world_.block_count()),
+               first_quad = first_strip + static_cast<std::uint32_t>(world_.strip_count());
+    // Strips and quads are at the end where one of their blocks is.
+    for (const std::int32_t strip : frame.strips) {
+        const auto sides = world_.sides(strip);
+        pieces_.push_back({first_strip + static_cast<std::uint32_t>(strip), world_.strip_version(strip),
+                           world_.strip_mesh(strip), is_at_end(sides.a) || is_at_end(sides.b)});
+    }
+    for (const std::int32_t quad : frame.quads) {
+        const auto mesh = world_.quad_mesh(quad);
+        const bool at_end = std::any_of(mesh.begin(), mesh.end(), [this](std::uint32_t vertex) {
+            return is_at_end(static_cast<int>(vertex / world_.vertices_per_block()));
         });
-    pieces_at_end_ = 0;
-    for_each_piece(frame, [&](std::span<const std::uint32_t>, bool at_end) { pieces_at_end_ += at_end ? 1 : 0; });
+        pieces_.push_back({first_quad + static_cast<std::uint32_t>(quad), 1, mesh, at_end});
+    }
     return frame;
+}
+
+std::vector<std::uint32_t> BlockScene::rooms() const {
+    const auto m = static_cast<std::uint32_t>(world_.bisection().cells());
+    std::vector<std::uint32_t> rooms(static_cast<std::size_t>(world_.block_count()), 6 * m * m);
+    rooms.resize(rooms.size() + static_cast<std::size_t>(world_.strip_count()), 6 * m);
+    rooms.resize(rooms.size() + static_cast<std::size_t>(world_.quad_count()), 6);
+    return rooms;
 }
 
 LatticePoint BlockScene::lattice_point(std::uint32_t vertex) const {
@@ -99,8 +104,8 @@ float BlockScene::height_n(std::uint32_t vertex) const {
 
 DrawnMesh BlockScene::drawn_mesh() const {
     DrawnMesh mesh;
-    for (const auto& piece : pieces_)
-        for (const std::uint32_t vertex : piece) {
+    for (const SurfacePiece& piece : pieces_)
+        for (const std::uint32_t vertex : piece.indices) {
             const LatticePoint at = lattice_point(vertex);
             mesh.corners.push_back(
                 {static_cast<std::int32_t>(at.i), static_cast<std::int32_t>(at.j), height_n(vertex), 0});
@@ -145,11 +150,14 @@ std::int64_t BlockScene::count_holes(const Camera& camera, int block) const {
         box = {glm::min(box.low, other.low), glm::max(box.high, other.high)};
     }
     const Frustum frustum(camera);
-    if (whole || !frustum.may_see(box)) return 0;
+    if (whole || !frustum.may_see(lowered_by_curvature(box, camera.eye, rules_.half_curvature))) return 0;
     const auto sees = [&](std::int64_t i, std::int64_t j) {
         const auto vertex = static_cast<std::uint32_t>(
             (j / row * world_.columns() + i / row) * world_.vertices_per_block() + j % row * row + i % row);
-        return frustum.contains(world_.position(vertex));
+        glm::dvec3 point = world_.position(vertex);
+        const double east = point.x - camera.eye.x, north = point.y - camera.eye.y;
+        point.z -= (east * east + north * north) * rules_.half_curvature;
+        return frustum.contains(point);
     };
     const std::int64_t end_i = std::min((x + 1) * row, world_.columns() * row - 1),
                        end_j = std::min((y + 1) * row, world_.rows() * row - 1);

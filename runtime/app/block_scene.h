@@ -1,5 +1,5 @@
 // BlockScene: a store in the layout of Ueng & Chuang (runtime/lod/block_world.h), whole in memory: what Scene is where
-// tiles are paged. The world is flat, and a store that is updated meanwhile is shown as it was. No OpenGL. One thread.
+// tiles are paged. A store that is updated meanwhile is shown as it was. No OpenGL. One thread.
 #pragma once
 
 #include <cstdint>
@@ -12,6 +12,7 @@
 #include "common/store/tile_store.h"
 #include "runtime/app/drawn_mesh.h"
 #include "runtime/lod/block_world.h"
+#include "runtime/lod/surface_piece.h"
 #include "runtime/scene/scene.h"
 
 namespace scree {
@@ -22,8 +23,7 @@ public:
     /// no more cells than there are samples.
     static constexpr std::int64_t kBytesPerSample = BlockWorld::kBytesPerSample + 16 + 24 + 3;
 
-    /// Of the options: budget, tau, lod; the curvature, which may not be on. Errors: ErrorCode::usage for that; those
-    /// of read_height_raster() and BlockWorld::make().
+    /// Of the options: budget, tau, lod, curvature. Errors: those of read_height_raster() and BlockWorld::make().
     static Result<std::unique_ptr<BlockScene>> open(const TileStore& store, const SceneOptions& options);
 
     const Dataset& dataset() const { return dataset_; }
@@ -35,12 +35,17 @@ public:
     /// How far off the finest data what is drawn may be, pixels; none where nothing is promised.
     std::optional<double> promise_px() const;
 
+    /// 1 / (2 R) of the last frame, 1/m; 0: flat.
+    double half_curvature() const { return rules_.half_curvature; }
+    /// Every block is chosen anew in the next frame.
+    void forget() { world_.forget(); }
+
     /// The frame, and all below that speaks of what is drawn, is valid until the next call.
     const BlockFrame& select(const Camera& camera);
-    /// Triangles drawn, three of the world's vertices each.
-    std::span<const std::span<const std::uint32_t>> pieces() const { return pieces_; }
-    /// The last so many of them reach into the band of edge_field().
-    std::size_t pieces_at_end() const { return pieces_at_end_; }
+    /// Triangles drawn, of the world's vertices: blocks, strips and quads, each in a place of its own.
+    std::span<const SurfacePiece> pieces() const { return pieces_; }
+    /// By place: the most indices that its piece can have.
+    std::vector<std::uint32_t> rooms() const;
     /// Where the blocks end. Null without SceneOptions::soft_edge.
     const std::shared_ptr<const EdgeField>& edge_field() const { return edge_field_; }
     LatticePoint lattice_point(std::uint32_t vertex) const;
@@ -55,20 +60,18 @@ private:
     BlockScene(const Dataset& dataset, const SceneOptions& options, BlockWorld world);
     void make_edge_field();
     bool is_at_end(int block) const;
-    template <class Take>
-    void for_each_piece(const BlockFrame& frame, const Take& take) const;
     bool is_drawn(std::int64_t x, std::int64_t y) const;
     bool covers(std::int64_t i, std::int64_t j) const;
     std::int64_t count_holes(const Camera& camera, int block) const;
 
     Dataset dataset_;
     LodSettings lod_;
+    Curvature curvature_;
     BlockRules rules_;
     BlockWorld world_;
     std::vector<std::uint8_t> drawn_;   ///< blocks
     std::vector<std::uint8_t> at_end_;  ///< blocks near the end
-    std::vector<std::span<const std::uint32_t>> pieces_;
-    std::size_t pieces_at_end_ = 0;
+    std::vector<SurfacePiece> pieces_;
     std::shared_ptr<const EdgeField> edge_field_;
 };
 

@@ -31,13 +31,14 @@ Result<std::unique_ptr<Stage>> BlockStage::create(const ViewOptions& o, std::sha
 StageFrame BlockStage::choose(std::span<const Camera> views, double, double) {
     frame_ = scene_->select(views[0]);
     StageFrame chosen;
+    chosen.half_curvature = scene_->half_curvature();
     chosen.changed = first_;
     first_ = false;
     return chosen;
 }
 
 Result<void> BlockStage::draw(const Camera& camera) {
-    if (auto times = display_->draw(camera); !times) return times.error();
+    display_->draw(camera);
     return {};
 }
 

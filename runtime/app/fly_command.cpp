@@ -281,12 +281,12 @@ Result<FlightPath> path_of(const TileStore& store, const ViewOptions& o, const F
 
 Result<void> run_blocks(const ViewOptions& o, const FlyOptions& f, const TileStore& store) {
     for (const auto& [given, option] :
-         {std::pair(f.settled, "--settled"), std::pair(f.see_through, "--see-through"),
-          std::pair(f.latency_ms > 0, "--latency"), std::pair(!f.report.empty(), "--report")})
+         {std::pair(f.see_through, "--see-through"), std::pair(f.latency_ms > 0, "--latency"),
+          std::pair(!f.report.empty(), "--report")})
         if (auto ok = refuse_with_blocks(given, option); !ok) return ok;
     auto path = path_of(store, o, f);
     if (!path) return path.error();
-    return fly_blocks(o, store, *path, {f.headless, f.fps, f.tau_most_px, f.csv, f.last_frame});
+    return fly_blocks(o, store, *path, {f.headless, f.fps, f.tau_most_px, f.settled, f.csv, f.last_frame});
 }
 
 Result<void> run(const ViewOptions& o, const FlyOptions& f) {

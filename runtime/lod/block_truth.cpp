@@ -48,27 +48,52 @@ private:
     double focal_px_;
 };
 
-void judge_block(const BlockWorld& world, const Projection& projection, int block, std::vector<double>& drawn,
-                 PixelErrors& errors) {
-    const auto z = world.heights(block);
-    drawn.resize(z.size());
-    surface_heights(world.bisection(), world.active(block), z, drawn);
-    const std::uint32_t base = static_cast<std::uint32_t>(block) * world.vertices_per_block();
-    for (std::size_t v = 0; v < z.size(); ++v) {
-        const glm::dvec3 point = world.position(base + static_cast<std::uint32_t>(v));
-        if (projection.sees(point)) errors.add(projection.displacement_px(point, drawn[v] - z[v]));
+// The vertices of a world as the eye sees them: lowered by curvature.
+class Bent {
+public:
+    Bent(const BlockWorld& world, const glm::dvec3& eye, double half_curvature)
+        : world_(world), eye_(eye), half_curvature_(half_curvature) {}
+    const BlockWorld& world() const { return world_; }
+    glm::dvec3 at(int block, std::int32_t vertex) const {
+        glm::dvec3 p = world_.position(static_cast<std::uint32_t>(block) * world_.vertices_per_block() +
+                                       static_cast<std::uint32_t>(vertex));
+        const double x = p.x - eye_.x, y = p.y - eye_.y;
+        p.z -= (x * x + y * y) * half_curvature_;
+        return p;
+    }
+
+private:
+    const BlockWorld& world_;
+    glm::dvec3 eye_;
+    double half_curvature_;
+};
+
+struct BlockHeights {
+    std::vector<double> full, drawn;
+};
+
+void judge_block(const Bent& bent, const Projection& projection, int block, BlockHeights& z, PixelErrors& errors) {
+    const BlockWorld& world = bent.world();
+    z.full.resize(world.vertices_per_block());
+    z.drawn.resize(z.full.size());
+    for (std::size_t v = 0; v < z.full.size(); ++v) z.full[v] = bent.at(block, static_cast<std::int32_t>(v)).z;
+    surface_heights(world.bisection(), world.active(block), z.full, z.drawn);
+    for (std::size_t v = 0; v < z.full.size(); ++v) {
+        const glm::dvec3 point = bent.at(block, static_cast<std::int32_t>(v));
+        if (projection.sees(point)) errors.add(projection.displacement_px(point, z.drawn[v] - z.full[v]));
     }
 }
 
 class Strip {
 public:
-    Strip(const BlockWorld& world, int strip) : world_(world), sides_(world.sides(strip)) {
+    Strip(const Bent& bent, int strip) : bent_(bent), sides_(bent.world().sides(strip)) {
+        const BlockWorld& world = bent.world();
         const std::int32_t m = world.bisection().cells();
         for (const bool on_b : {false, true})
             for (std::int32_t y = 0; y <= m; ++y) {
                 const std::int32_t v = world.side_vertex(sides_.lie, on_b, y);
                 const int block = on_b ? sides_.b : sides_.a;
-                z_[on_b].push_back(world.heights(block)[static_cast<std::size_t>(v)]);
+                z_[on_b].push_back(bent.at(block, v).z);
                 if (world.active(block)[static_cast<std::size_t>(v)] != 0) drawn_[on_b].push_back(y);
             }
     }
@@ -89,11 +114,10 @@ public:
 
 private:
     glm::dvec3 point(bool on_b, std::int32_t y) const {
-        return world_.position(static_cast<std::uint32_t>(on_b ? sides_.b : sides_.a) * world_.vertices_per_block() +
-                               static_cast<std::uint32_t>(world_.side_vertex(sides_.lie, on_b, y)));
+        return bent_.at(on_b ? sides_.b : sides_.a, bent_.world().side_vertex(sides_.lie, on_b, y));
     }
 
-    const BlockWorld& world_;
+    const Bent& bent_;
     BlockWorld::StripSides sides_;
     std::array<std::vector<double>, 2> z_;
     std::array<std::vector<std::int32_t>, 2> drawn_;
@@ -119,14 +143,15 @@ double PixelErrors::quantile_px(double share) const {
 }
 
 void judge_frame(const BlockWorld& world, const Camera& camera, const BlockFrame& frame, double limit_px,
-                 BlockTruth& truth) {
+                 BlockTruth& truth, double half_curvature) {
     const Projection projection(camera);
-    std::vector<double> drawn;
-    for (const std::int32_t block : frame.blocks) judge_block(world, projection, block, drawn, truth.blocks);
+    const Bent bent(world, camera.eye, half_curvature);
+    BlockHeights heights;
+    for (const std::int32_t block : frame.blocks) judge_block(bent, projection, block, heights, truth.blocks);
     for (const std::int32_t index : frame.strips) {
         bool seen = false;
         double worst = 0;
-        Strip(world, index).for_each_error([&](const glm::dvec3& point, double by_m) {
+        Strip(bent, index).for_each_error([&](const glm::dvec3& point, double by_m) {
             if (!projection.sees(point)) return;
             const double px = projection.displacement_px(point, by_m);
             truth.dikes.add(px);

@@ -34,9 +34,9 @@ struct BlockTruth {
     std::int64_t strips = 0, strips_above = 0;  ///< judged: those in view; of these, with an error above `limit_px`
 };
 
-/// Adds the errors of what select() has just drawn for this camera.
+/// Adds the errors of what select() has just drawn for this camera, on an earth of `half_curvature` = 1 / (2 R), 1/m.
 void judge_frame(const BlockWorld& world, const Camera& camera, const BlockFrame& frame, double limit_px,
-                 BlockTruth& truth);
+                 BlockTruth& truth, double half_curvature = 0);
 
 /// Of the paper's own test, over the blocks of a frame.
 struct SelectionTruth {

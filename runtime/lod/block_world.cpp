@@ -11,6 +11,7 @@
 
 #include "common/process_usage.h"
 #include "runtime/lod/block_kernels.h"
+#include "runtime/lod/cut.h"
 #include "runtime/lod/vertex_errors.h"
 
 namespace scree {
@@ -128,6 +129,11 @@ void BlockWorld::make_tables() {
     for (int level = 1; level <= b.levels(); ++level)
         first_of_level_.push_back(static_cast<std::size_t>(b.of_level(level).data() - order.data()));
     first_of_level_.push_back(order_size_);
+    // The circle round a triangle: half a hypotenuse, m / sqrt(2) of the block's own; round a strip's piece between the
+    // same ends half a cell's side as well, squared.
+    for (int level = 0; level <= b.levels(); ++level)
+        bulge_m2_.push_back(spacing_m_ * spacing_m_ *
+                            (0.5 * b.cells() * b.cells() / std::exp2(level - 1) + (dike_aware_ ? 0.25 : 0)));
     const double half = 0.5 * b.cells();
     for (const std::int32_t v : order) {
         const std::int32_t i = v % b.row(), j = v / b.row();
@@ -321,7 +327,15 @@ bool BlockWorld::test_level(int index, int level, const Sighting& s, double dist
     const LevelMaxima& most =
         maxima_[static_cast<std::size_t>(index) * static_cast<std::size_t>(bisection_->levels() + 1) +
                 static_cast<std::size_t>(level)];
-    const double error_m = static_cast<double>(most.error), tau_px = s.rules.tau_px;
+    const double tau_px = s.rules.tau_px,
+                 curving_m = s.rules.half_curvature * bulge_m2_[static_cast<std::size_t>(level)];
+    const double error_m = static_cast<double>(most.error) + curving_m;
+    std::array<float, kMaxBlockVertices> curved;
+    const float* error = error_.data() + at;
+    if (curving_m > 0) {
+        for (std::size_t k = 0; k < count; ++k) curved[k] = rounded_up(static_cast<double>(error[k]) + curving_m);
+        error = curved.data();
+    }
     const Block& block = blocks_[static_cast<std::size_t>(index)];
     const glm::vec3 relative(s.eye - block.middle);
     const LocalEye eye{relative.x, relative.y, relative.z};
@@ -335,14 +349,21 @@ bool BlockWorld::test_level(int index, int level, const Sighting& s, double dist
                  fails + first);
     } else if (s.rules.metric == BlockMetric::by_block) {
         const double scale = s.focal_px * s.off_axis;
-        const double threshold_m = tau_px * distance_to_box(s.eye, bound_box(block)) / scale;
+        const Box box = lowered_by_curvature(bound_box(block), s.eye, s.rules.half_curvature);
+        const double threshold_m = tau_px * distance_to_box(s.eye, box) / scale;
         if (error_m < 0.999 * threshold_m) return false;
-        fails_threshold(error_.data() + at, count, rounded_down(threshold_m * (1 - 1e-12)), fails + first);
+        fails_threshold(error, count, rounded_down(threshold_m * (1 - 1e-12)), fails + first);
     } else {
         const double scale = s.rules.metric == BlockMetric::nested ? s.focal_px : s.focal_px * s.off_axis;
+        if (curving_m > 0) {
+            fails_ball_curved(vertices, error, radius_.data() + at, eye, rounded_up(scale),
+                              static_cast<float>(s.rules.floor), rounded_down(tau_px),
+                              rounded_up(s.rules.half_curvature), fails + first);
+            return true;
+        }
         if (scale * error_m < tolerance * (distance_m - static_cast<double>(most.radius))) return false;
-        fails_ball(vertices, error_.data() + at, radius_.data() + at, eye, rounded_up(scale),
-                   static_cast<float>(s.rules.floor), rounded_down(tau_px), fails + first);
+        fails_ball(vertices, error, radius_.data() + at, eye, rounded_up(scale), static_cast<float>(s.rules.floor),
+                   rounded_down(tau_px), fails + first);
     }
     return true;
 }
@@ -374,6 +395,13 @@ void BlockWorld::select_anew(int block, const Camera& camera, const BlockRules& 
     choose(block, Sighting(camera, rules), active.data());
 }
 
+// The column over the block: of a box that is lowered as the eye sees it.
+EyeToBox BlockWorld::eye_to(int block, const glm::dvec3& eye) const {
+    const Box& box = bound_box(blocks_[static_cast<std::size_t>(block)]);
+    if (!(rules_.half_curvature > 0)) return eye_to_box(eye, box);
+    return eye_to_box(eye, lowered_by_curvature(box, eye, rules_.half_curvature));
+}
+
 bool BlockWorld::may_reuse(int index, const EyeToBox& now, const glm::dvec3& eye) const {
     const Block& block = blocks_[static_cast<std::size_t>(index)];
     if (rules_.reuse == ReuseTest::off || block.chosen.generation != generation_) return false;
@@ -382,7 +410,14 @@ bool BlockWorld::may_reuse(int index, const EyeToBox& now, const glm::dvec3& eye
         return (rules_.each_corner ? reuse_p2 : reuse_p1)(then, eye, corners(index), block.box, focal_px_, rules_.s_px,
                                                           rules_.tau_px);
     const ReuseAllowance allowance{rules_.tau_px, rules_.s_px};
-    const double moved_m = glm::length(eye - then);
+    double moved_m = glm::length(eye - then);
+    // Relative to the eye, a point over a curved earth moves by more than the eye does.
+    if (rules_.half_curvature > 0) {
+        const Box& box = bound_box(block);
+        const double furthest_m = std::max(block.chosen.to_box.level_m, now.level_m) +
+                                  std::hypot(box.high.x - box.low.x, box.high.y - box.low.y);
+        moved_m *= 1 + (2 * furthest_m + moved_m) * rules_.half_curvature;
+    }
     switch (rules_.metric) {
         case BlockMetric::by_block:
             return reuse_t2(now, moved_m, allowance);
@@ -431,21 +466,22 @@ void BlockWorld::take_sides(int index) {
     blocks_[static_cast<std::size_t>(index)].sides = sides;
 }
 
-bool BlockWorld::is_visible(const Frustum& frustum, int index) const {
+bool BlockWorld::is_visible(const Frustum& frustum, const glm::dvec3& eye, int index) const {
     if (rules_.culling == Culling::corners) return sees_a_corner(frustum, corners(index));
-    return frustum.may_see(blocks_[static_cast<std::size_t>(index)].reach_box);
+    return frustum.may_see(
+        lowered_by_curvature(blocks_[static_cast<std::size_t>(index)].reach_box, eye, rules_.half_curvature));
 }
 
 void BlockWorld::find_visible(const Camera& camera) {
     const Frustum frustum(camera);
     for (std::size_t g = 0; g < group_boxes_.size(); ++g) {
-        const Sight sight = frustum.sight(group_boxes_[g]);
+        const Sight sight = frustum.sight(lowered_by_curvature(group_boxes_[g], camera.eye, rules_.half_curvature));
         if (sight == Sight::none) continue;
         const int x0 = static_cast<int>(g) % group_columns_ * kGroup,
                   y0 = static_cast<int>(g) / group_columns_ * kGroup;
         for (int y = y0; y < std::min(y0 + kGroup, rows_); ++y)
             for (int x = x0; x < std::min(x0 + kGroup, columns_); ++x)
-                if (sight == Sight::all || is_visible(frustum, y * columns_ + x))
+                if (sight == Sight::all || is_visible(frustum, camera.eye, y * columns_ + x))
                     seen_blocks_.push_back(y * columns_ + x);
     }
 }
@@ -466,7 +502,7 @@ const BlockFrame& BlockWorld::select(const Camera& camera, const BlockRules& rul
     for (const std::int32_t index : seen_blocks_) {
         Block& block = blocks_[static_cast<std::size_t>(index)];
         block.seen_in_frame = frame_number_;
-        const EyeToBox now = eye_to_box(camera.eye, bound_box(block));
+        const EyeToBox now = eye_to(index, camera.eye);
         block.reused = may_reuse(index, now, camera.eye);
         if (block.reused) {
             ++frame_.reused;

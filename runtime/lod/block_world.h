@@ -1,6 +1,7 @@
 // BlockWorld: the layout of Ueng & Chuang. A raster as blocks of 33 x 33 vertices that share nothing (stride 33), each
 // with its own selection and, with a cache, the eye that it was made for; strips and corner quads (dike.h) between
-// them. What the paper leaves open or gets wrong is as in Scree lod, sections 1 and 2. Heights are flat: no curvature.
+// them. What the paper leaves open or gets wrong is as in Scree lod, sections 1 and 2. Over a curved earth what flat
+// triangles miss of it counts as an error as well.
 //
 // A frame: blocks in view by box; each is reused if the reuse test allows, else selected anew; a mesh is made again
 // only where the selection changed, a strip only where one of its sides did. One thread.
@@ -41,6 +42,7 @@ struct BlockRules {
     /// c of max(h, c r) (nested, guaranteed): larger reuses more under a steep eye, and draws more triangles.
     double floor = 0.3;
     Culling culling = Culling::box;
+    double half_curvature = 0;  ///< 1 / (2 R), 1/m; uc chooses as if it were 0
 
     friend bool operator==(const BlockRules&, const BlockRules&) = default;
 };
@@ -83,6 +85,8 @@ public:
     int columns() const { return columns_; }
     int rows() const { return rows_; }
     int block_count() const { return columns_ * rows_; }
+    int strip_count() const { return static_cast<int>(strips_.size()); }
+    int quad_count() const { return static_cast<int>(quads_.size() / 6); }
     std::int64_t dropped_columns() const { return dropped_columns_; }
     std::int64_t dropped_rows() const { return dropped_rows_; }
     double spacing_m() const { return spacing_m_; }
@@ -174,10 +178,11 @@ private:
     bool test_level(int block, int level, const Sighting& s, double distance_m, std::uint8_t* fails) const;
     void choose(int block, const Sighting& sighting, std::uint8_t* active) const;
     bool may_reuse(int block, const EyeToBox& now, const glm::dvec3& eye) const;
+    EyeToBox eye_to(int block, const glm::dvec3& eye) const;
     void regenerate(int block, const Sighting& sighting);
     void make_mesh(int block);
     void take_sides(int block);
-    bool is_visible(const Frustum& frustum, int block) const;
+    bool is_visible(const Frustum& frustum, const glm::dvec3& eye, int block) const;
     void find_visible(const Camera& camera);
     void gather_dikes();
     void draw_strip(int strip);
@@ -195,6 +200,7 @@ private:
     std::vector<float> x_, y_;
     std::vector<std::uint16_t> vertex_of_, parent_0_, parent_1_, order_of_;
     std::vector<std::size_t> first_of_level_;
+    std::vector<double> bulge_m2_;  ///< by level: what curvature bends by within a triangle split there, over 1 / (2 R)
     std::unique_ptr<TriangleWalk> walk_;
 
     std::vector<double> z_;                                ///< by vertex

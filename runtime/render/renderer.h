@@ -77,6 +77,7 @@ struct FrameTimes {
     std::uint32_t edge_draws = 0;     ///< parts of tiles drawn again where the data ends
     std::uint32_t imagery_kinds = 0;  ///< bits: the Imagery of the draws, a program each
     std::uint64_t triangles = 0;
+    std::uint64_t uploaded_bytes = 0;  ///< SurfaceRenderer: indices sent in this frame
     double submitted_ms = 0;  ///< wall time of draw() without waiting
     double finished_ms = 0;   ///< wall time with waiting; 0 without wait_until_drawn
 };

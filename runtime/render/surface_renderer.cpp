@@ -9,8 +9,9 @@
 #include <chrono>
 #include <cmath>
 #include <cstddef>
-#include <cstring>
+#include <limits>
 #include <utility>
+#include <vector>
 
 #include "common/tint/hypsometry.h"
 #include "runtime/render/frame_passes.h"
@@ -76,73 +77,94 @@ std::array<glm::vec3, shader::kTintColours> tints_of(const SurfaceOptions& o) {
 struct SurfaceRenderer::State {
     SurfaceOptions options;
     BufferHandle vertices, indices;
-    std::size_t index_bytes = 0;  ///< of the buffer
     VertexArrayHandle array;
     std::array<ProgramHandle, 2> ground;  ///< without haze and with it
     SkyPass sky;
     EdgePass edge;
     std::array<glm::vec3, shader::kTintColours> tints;
 
-    /// Returns how many.
-    Result<std::size_t> upload(std::span<const std::span<const std::uint32_t>> pieces);
-    void draw_ground(const Camera& camera, const FrameSettings& settings, std::size_t count) const;
-    void draw_edge(const Camera& camera, const FrameSettings& settings, std::size_t first, std::size_t count) const;
+    std::vector<std::size_t> first_of;        ///< index, by place, and the end
+    std::vector<std::uint32_t> version_sent;  ///< by place; 0: nothing
+    // A frame's draws: of pieces that stand together one.
+    struct Draws {
+        std::vector<GLsizei> counts;
+        std::vector<const void*> offsets;
+    };
+    Draws all, at_end;
+
+    /// Returns the bytes sent.
+    std::uint64_t upload(std::span<const SurfacePiece> pieces);
+    template <class Belongs>
+    void gather(std::span<const SurfacePiece> pieces, const Belongs& belongs, Draws& draws) const;
+    RelativeFrame frame_of(const Camera& camera, const FrameSettings& settings) const;
+    void draw(const Draws& draws) const;
+    void draw_ground(const Camera& camera, const FrameSettings& settings) const;
+    void draw_edge(const Camera& camera, const FrameSettings& settings) const;
 };
 
-// Whole, every frame: the driver keeps what frames under way still read.
-Result<std::size_t> SurfaceRenderer::State::upload(std::span<const std::span<const std::uint32_t>> pieces) {
-    std::size_t count = 0;
-    for (const auto& piece : pieces) count += piece.size();
-    if (count == 0) return count;
-    const std::size_t bytes = count * sizeof(std::uint32_t);
-    if (bytes > index_bytes) {
-        index_bytes = bytes + bytes / 4;
-        glNamedBufferData(indices.name(), static_cast<GLsizeiptr>(index_bytes), nullptr, GL_STREAM_DRAW);
+std::uint64_t SurfaceRenderer::State::upload(std::span<const SurfacePiece> pieces) {
+    std::uint64_t sent = 0;
+    for (const SurfacePiece& piece : pieces) {
+        assert(piece.version != 0 && piece.indices.size() <= first_of[piece.place + 1] - first_of[piece.place]);
+        if (version_sent[piece.place] == piece.version) continue;
+        version_sent[piece.place] = piece.version;
+        if (piece.indices.empty()) continue;
+        glNamedBufferSubData(indices.name(), static_cast<GLintptr>(first_of[piece.place] * sizeof(std::uint32_t)),
+                             static_cast<GLsizeiptr>(piece.indices.size_bytes()), piece.indices.data());
+        sent += piece.indices.size_bytes();
     }
-    auto* at = static_cast<std::byte*>(glMapNamedBufferRange(indices.name(), 0, static_cast<GLsizeiptr>(bytes),
-                                                             GL_MAP_WRITE_BIT | GL_MAP_INVALIDATE_BUFFER_BIT));
-    if (at == nullptr) {
-        index_bytes = 0;
-        return Error{ErrorCode::display, fmt::format("OpenGL cannot map {} bytes for a frame's triangles", bytes)};
-    }
-    for (const auto& piece : pieces) {
-        if (piece.empty()) continue;
-        std::memcpy(at, piece.data(), piece.size_bytes());
-        at += piece.size_bytes();
-    }
-    if (glUnmapNamedBuffer(indices.name()) != GL_TRUE)
-        return Error{ErrorCode::display, "OpenGL lost the triangles of a frame"};
-    return count;
+    return sent;
 }
 
-void SurfaceRenderer::State::draw_ground(const Camera& camera, const FrameSettings& settings, std::size_t count) const {
-    if (count == 0) return;
+template <class Belongs>
+void SurfaceRenderer::State::gather(std::span<const SurfacePiece> pieces, const Belongs& belongs, Draws& draws) const {
+    draws.counts.clear();
+    draws.offsets.clear();
+    std::size_t end = std::numeric_limits<std::size_t>::max();
+    for (const SurfacePiece& piece : pieces) {
+        if (piece.indices.empty() || !belongs(piece)) continue;
+        const std::size_t first = first_of[piece.place];
+        if (first == end) {
+            draws.counts.back() += static_cast<GLsizei>(piece.indices.size());
+        } else {
+            draws.counts.push_back(static_cast<GLsizei>(piece.indices.size()));
+            draws.offsets.push_back(reinterpret_cast<const void*>(first * sizeof(std::uint32_t)));
+        }
+        end = first + piece.indices.size();
+    }
+}
+
+RelativeFrame SurfaceRenderer::State::frame_of(const Camera& camera, const FrameSettings& settings) const {
+    return make_relative_frame(options.lattice, options.height_offset_m, options.height_quantum_m, camera.eye,
+                               settings.half_curvature);
+}
+
+void SurfaceRenderer::State::draw(const Draws& draws) const {
+    glBindVertexArray(array.name());
+    glMultiDrawElements(GL_TRIANGLES, draws.counts.data(), GL_UNSIGNED_INT, draws.offsets.data(),
+                        static_cast<GLsizei>(draws.counts.size()));
+}
+
+void SurfaceRenderer::State::draw_ground(const Camera& camera, const FrameSettings& settings) const {
+    if (all.counts.empty()) return;
     const GLuint program = ground[settings.haze_distance_m > 0 ? 1 : 0].name();
-    set_position(
-        program, camera,
-        make_relative_frame(options.lattice, options.height_offset_m, options.height_quantum_m, camera.eye, 0));
+    set_position(program, camera, frame_of(camera, settings));
     set_atmosphere(program, camera, settings);
     const double span_n = std::max(options.high_n - options.low_n, 1.0);
     glProgramUniform3fv(program, shader::kTintColoursUniform, shader::kTintColours, &tints[0].x);
     glProgramUniform2f(program, shader::kTintUniform, static_cast<float>(1 / span_n),
                        static_cast<float>(-options.low_n / span_n));
     glUseProgram(program);
-    glBindVertexArray(array.name());
     glPolygonMode(GL_FRONT_AND_BACK, settings.wireframe ? GL_LINE : GL_FILL);
-    glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(count), GL_UNSIGNED_INT, nullptr);
+    draw(all);
     glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
 }
 
-// Indices `first` to `count`, once more.
-void SurfaceRenderer::State::draw_edge(const Camera& camera, const FrameSettings& settings, std::size_t first,
-                                       std::size_t count) const {
-    if (first == count || edge.field_for(settings) == nullptr) return;
-    edge.begin(camera,
-               make_relative_frame(options.lattice, options.height_offset_m, options.height_quantum_m, camera.eye, 0),
-               options.lattice, settings);
-    glBindVertexArray(array.name());
-    glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(count - first), GL_UNSIGNED_INT,
-                   reinterpret_cast<const void*>(first * sizeof(std::uint32_t)));
+// Once more, over the sky.
+void SurfaceRenderer::State::draw_edge(const Camera& camera, const FrameSettings& settings) const {
+    if (at_end.counts.empty() || edge.field_for(settings) == nullptr) return;
+    edge.begin(camera, frame_of(camera, settings), options.lattice, settings);
+    draw(at_end);
     EdgePass::end();
 }
 
@@ -150,8 +172,9 @@ SurfaceRenderer::SurfaceRenderer(std::unique_ptr<State> state) : state_(std::mov
 SurfaceRenderer::~SurfaceRenderer() = default;
 
 Result<std::unique_ptr<SurfaceRenderer>> SurfaceRenderer::create(const SurfaceOptions& options,
-                                                                 std::span<const SurfaceVertex> vertices) {
-    assert(!vertices.empty());
+                                                                 std::span<const SurfaceVertex> vertices,
+                                                                 std::span<const std::uint32_t> rooms) {
+    assert(!vertices.empty() && !rooms.empty());
     auto state = std::make_unique<State>();
     state->options = options;
     state->tints = tints_of(options);
@@ -169,10 +192,15 @@ Result<std::unique_ptr<SurfaceRenderer>> SurfaceRenderer::create(const SurfaceOp
     state->vertices = make_buffer();
     state->indices = make_buffer();
     glNamedBufferStorage(state->vertices.name(), static_cast<GLsizeiptr>(vertices.size_bytes()), vertices.data(), 0);
+    state->version_sent.resize(rooms.size());
+    state->first_of.assign(1, 0);
+    for (const std::uint32_t room : rooms) state->first_of.push_back(state->first_of.back() + room);
+    const std::size_t index_bytes = state->first_of.back() * sizeof(std::uint32_t);
+    glNamedBufferStorage(state->indices.name(), static_cast<GLsizeiptr>(index_bytes), nullptr, GL_DYNAMIC_STORAGE_BIT);
     state->array = make_vertex_array(state->vertices.name(), state->indices.name());
     if (glGetError() != GL_NO_ERROR)
-        return Error{ErrorCode::display,
-                     fmt::format("OpenGL has no memory for {} bytes of vertices", vertices.size_bytes())};
+        return Error{ErrorCode::display, fmt::format("OpenGL has no memory for {} bytes of vertices and {} of indices",
+                                                     vertices.size_bytes(), index_bytes)};
     return std::unique_ptr<SurfaceRenderer>(new SurfaceRenderer(std::move(state)));
 }
 
@@ -180,24 +208,24 @@ Result<void> SurfaceRenderer::set_edge_field(std::shared_ptr<const EdgeField> fi
     return state_->edge.set_field(std::move(field));
 }
 
-Result<FrameTimes> SurfaceRenderer::draw(const Camera& camera, std::span<const std::span<const std::uint32_t>> pieces,
-                                         std::size_t at_end, const FrameSettings& settings, RenderTarget& target) {
-    assert(at_end <= pieces.size());
+FrameTimes SurfaceRenderer::draw(const Camera& camera, std::span<const SurfacePiece> pieces,
+                                 const FrameSettings& settings, RenderTarget& target) {
     assert(camera.width_px == target.width_px() && camera.height_px == target.height_px());
     const Clock::time_point start = Clock::now();
-    auto count = state_->upload(pieces);
-    if (!count) return count.error();
+    FrameTimes times;
+    times.uploaded_bytes = state_->upload(pieces);
+    state_->gather(
+        pieces, [](const SurfacePiece&) { return true; }, state_->all);
+    state_->gather(
+        pieces, [](const SurfacePiece& piece) { return piece.at_end; }, state_->at_end);
     begin_picture(target);
-    state_->draw_ground(camera, settings, *count);
+    state_->draw_ground(camera, settings);
     if (!settings.magenta_background) {
         state_->sky.draw(camera, settings);
-        std::size_t first = *count;
-        for (const auto& piece : pieces.last(at_end)) first -= piece.size();
-        state_->draw_edge(camera, settings, first, *count);
+        state_->draw_edge(camera, settings);
     }
-    FrameTimes times;
-    times.draws = *count > 0 ? 1 : 0;
-    times.triangles = *count / 3;
+    times.draws = static_cast<std::uint32_t>(state_->all.counts.size());
+    for (const GLsizei count : state_->all.counts) times.triangles += static_cast<std::uint64_t>(count) / 3;
     times.submitted_ms = ms_since(start);
     if (settings.wait_until_drawn) {
         glFinish();

@@ -1,5 +1,6 @@
 // SurfaceRenderer: draws triangles between fixed lattice vertices, untextured (tinted by height and slope), and the
-// sky. Which triangles may change with every frame; nothing is paged. OpenGL thread only, like Renderer.
+// sky. Which triangles may change with every frame; those of a piece stay in the index buffer until they do. Nothing is
+// paged. OpenGL thread only, like Renderer.
 #pragma once
 
 #include <cstddef>
@@ -9,6 +10,7 @@
 
 #include "common/lattice.h"
 #include "common/result.h"
+#include "runtime/lod/surface_piece.h"
 #include "runtime/render/render_target.h"
 #include "runtime/render/renderer.h"
 #include "runtime/view/camera.h"
@@ -32,9 +34,11 @@ struct SurfaceOptions {
 
 class SurfaceRenderer {
 public:
-    /// Needs a current GlContext. Errors (ErrorCode::display): no memory for the vertices, a shader does not compile.
+    /// `rooms`: by place, the most indices that a piece may have; all of it is taken at once. Needs a current
+    /// GlContext. Errors (ErrorCode::display): no memory for the vertices and indices, a shader does not compile.
     static Result<std::unique_ptr<SurfaceRenderer>> create(const SurfaceOptions& options,
-                                                           std::span<const SurfaceVertex> vertices);
+                                                           std::span<const SurfaceVertex> vertices,
+                                                           std::span<const std::uint32_t> rooms);
     ~SurfaceRenderer();
     SurfaceRenderer(const SurfaceRenderer&) = delete;
     SurfaceRenderer& operator=(const SurfaceRenderer&) = delete;
@@ -42,12 +46,11 @@ public:
     /// As Renderer's.
     Result<void> set_edge_field(std::shared_ptr<const EdgeField> field);
 
-    /// Clears `target`, draws the triangles of all pieces (three vertex numbers each, counter-clockwise from above; not
-    /// checked) and the sky. The last `at_end` pieces are all that reach into the EdgeField's band. The camera's size
-    /// is the target's. Of the settings, there are no levels to colour by, and the world is flat. Errors
-    /// (ErrorCode::display): no memory for the triangles.
-    Result<FrameTimes> draw(const Camera& camera, std::span<const std::span<const std::uint32_t>> pieces,
-                            std::size_t at_end, const FrameSettings& settings, RenderTarget& target);
+    /// Clears `target`, draws the triangles of all pieces (no place twice; vertex numbers are not checked) and the sky.
+    /// Sends what is not there in its version yet: FrameTimes::uploaded_bytes. The camera's size is the target's. Of
+    /// the settings, there are no levels to colour by.
+    FrameTimes draw(const Camera& camera, std::span<const SurfacePiece> pieces, const FrameSettings& settings,
+                    RenderTarget& target);
 
 private:
     struct State;

@@ -15,8 +15,9 @@ out float height_share;
 out vec3 normal;
 
 void main() {
-    relative_m = flat_position(lattice_vertex, height_n);
-    haze_density = mean_haze_density(relative_m.z);
+    vec3 flat_m = flat_position(lattice_vertex, height_n);
+    relative_m = curved_position(flat_m, curvature_drop(flat_m, 0.0));
+    haze_density = mean_haze_density(flat_m.z);
     height_share = height_n * tint.x + tint.y;
     normal = vec3(normal_across, sqrt(max(1.0 - dot(normal_across, normal_across), 0.0)));
     gl_Position = clip_from_relative * vec4(relative_m, 1.0);
