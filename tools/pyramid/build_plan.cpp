@@ -132,6 +132,29 @@ Result<void> plan_textures(BuildPlan& plan) {
     return {};
 }
 
+Result<std::vector<PlaneBox>> boxes_of(const std::vector<PlacedFile>& files, const Crs& crs) {
+    std::vector<PlaneBox> boxes;
+    for (const PlacedFile& f : files) {
+        auto box = box_of(f, crs);
+        if (!box) return box.error();
+        boxes.push_back(*box);
+    }
+    return boxes;
+}
+
+Result<void> plan_coverage(BuildPlan& plan) {
+    const MosaicPlan& m = plan.mosaic;
+    if (m.heights.size() < 2) return {};
+    auto places = boxes_of(m.heights, m.crs);
+    if (!places) return places.error();
+    const Lattice base = m.base_lattice();
+    std::vector<Coverage::Box> boxes;
+    for (const PlaneBox& b : *places)
+        boxes.push_back({base.i_of(b.west), base.j_of(b.north), base.i_of(b.east), base.j_of(b.south)});
+    plan.coverage = Coverage(base, boxes);
+    return {};
+}
+
 // Texels side by side that are made at once under the coarsest level, and what that takes: as many as there is memory
 // for, because images are decoded in whole rows.
 std::int64_t plan_deep_textures(const BuildOptions& o, std::int64_t others, BuildPlan& plan) {
@@ -165,17 +188,20 @@ void plan_resources(const BuildOptions& o, BuildPlan& plan) {
     if (plan.textures.varies()) texture += texels_wide * d.texture_size() * 4;
     texture += plan_deep_textures(o, kProcessBytes + decoder_usage().peak_rss_bytes + texture, plan);
     plan.memory_bytes = kProcessBytes + decoder_usage().peak_rss_bytes + std::max(heights, texture);
-    plan.temporary_bytes = HeightSpool::bytes_needed(width, rows, plan.wide_heights);
+    const double share = Coverage::tile_count(plan.coverage, base, base.deepest_level) /
+                         Coverage::tile_count({}, base, base.deepest_level);
+    plan.temporary_bytes = static_cast<std::int64_t>(
+        share * static_cast<double>(HeightSpool::bytes_needed(width, rows, plan.wide_heights)));
     if (!plan.heights_in_place) plan.temporary_bytes += height_stack_bytes(m.heights);
     plan.temporary_bytes += LevelImagery::temporary_bytes(plan);
 
     double height_tiles = 0, texture_tiles = 0;
     for (int level = 0; level <= std::max(base.deepest_level, d.texture_deepest_level); ++level) {
-        const double extent = std::ldexp(base.tile_cells(), base.deepest_level - level);
-        const double tiles = std::ceil(static_cast<double>(base.cells_x) / extent) *
-                             std::ceil(static_cast<double>(base.cells_y) / extent);
+        const int above = std::min(level, base.deepest_level);
+        const double tiles = std::ldexp(Coverage::tile_count(plan.coverage, base, above), 2 * (level - above));
         if (level <= base.deepest_level) height_tiles += tiles;
-        if (level <= d.texture_deepest_level) texture_tiles += static_cast<double>(plan.textures.count(level));
+        if (level <= d.texture_deepest_level)
+            texture_tiles += std::min(static_cast<double>(plan.textures.count(level)), tiles);
     }
     for (std::size_t k = 0; k < m.height_layers.size(); ++k) {
         if (m.layer_level[k] <= base.deepest_level) continue;
@@ -200,16 +226,6 @@ SourceRecord source_record(const std::string& path, const char* role, const Imag
             info.width,
             info.height,
             fingerprint_of(path)};
-}
-
-Result<std::vector<PlaneBox>> boxes_of(const std::vector<PlacedFile>& files, const Crs& crs) {
-    std::vector<PlaneBox> boxes;
-    for (const PlacedFile& f : files) {
-        auto box = box_of(f, crs);
-        if (!box) return box.error();
-        boxes.push_back(*box);
-    }
-    return boxes;
 }
 
 // Bottom to top where files overlap, by name where they do not: the order of files that do not overlap changes nothing.
@@ -322,6 +338,7 @@ Result<BuildPlan> plan_build(const BuildOptions& o) {
         }
     }
     d.has_imagery = !m.imagery.empty();
+    if (auto ok = plan_coverage(plan); !ok) return ok.error();
     if (auto ok = plan_textures(plan); !ok) return ok.error();
     choose_ways(plan);
     plan_resources(o, plan);

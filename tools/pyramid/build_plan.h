@@ -13,6 +13,7 @@
 #include "common/store/height_codec.h"
 #include "tools/mosaic/mosaic_plan.h"
 #include "tools/pyramid/bc1_encoder.h"
+#include "tools/pyramid/coverage.h"
 #include "tools/pyramid/texture_depth.h"
 #include "tools/pyramid/void_fill.h"
 
@@ -57,6 +58,7 @@ struct BuildPlan {
     bool integer_heights = false;           ///< every height is an integer of the file's, nothing is resampled
     bool wide_heights = false;              ///< values do not fit float32
     Dataset dataset;                        ///< lattice, CRS, texture depth; heights still unknown
+    Coverage coverage;                      ///< of the dense part by the files with heights
     TextureDepth textures;                  ///< which of their tiles are refined
     std::vector<int> image_level;           ///< of each image: the texture level that it asks for
     std::int64_t deep_texels_wide = 0;      ///< where textures go deeper, so many are made side by side

@@ -125,11 +125,8 @@ public:
     }
 
     Result<HeightPyramidResult> run() {
-        if (auto ok = gather_corners(); !ok) return ok.error();
-        const std::int64_t bands = (lattice_.cells_y + m_ - 1) / m_;
-        for (std::int64_t band = 0; band < bands; ++band)
-            if (auto ok = make_band(); !ok) return ok.error();
-        if (auto ok = flush(); !ok) return ok.error();
+        auto made = job_.coverage == nullptr ? make_all() : make_covered();
+        if (!made) return made.error();
         result_.tile_count = tile_count_;
         result_.min_n = range_.min_n;
         result_.max_n = range_.max_n;
@@ -138,6 +135,14 @@ public:
     }
 
 private:
+    Result<void> make_all() {
+        if (auto ok = gather_corners(); !ok) return ok;
+        const std::int64_t bands = (lattice_.cells_y + m_ - 1) / m_;
+        for (std::int64_t band = 0; band < bands; ++band)
+            if (auto ok = make_band(); !ok) return ok;
+        return flush();
+    }
+
     Result<void> gather_corners() {
         std::vector<double> raw(static_cast<std::size_t>(width_));
         std::vector<std::uint8_t> valid(raw.size());
@@ -164,7 +169,7 @@ private:
                 if (!job_.on_rows(j + 1)) return Error{ErrorCode::interrupted, "stopped"};
         repeat_last_row(end);
         deepest.rows = m_ + 1;
-        if (auto ok = emit_deepest(deepest); !ok) return ok;
+        if (auto ok = emit_deepest(deepest, {{0, deepest.columns}}); !ok) return ok;
         const std::int64_t last = (deepest.band + 1) * m_;
         deepest.start_next(m_);
         std::copy_n(valid_.data() + m_ * width_, width_, valid_.data());
@@ -172,7 +177,8 @@ private:
             LevelBand& band = levels_[static_cast<std::size_t>(level)];
             band.rows = std::min(last / band.step - band.band * m_, m_) + 1;
             if (band.rows <= m_) continue;
-            if (auto ok = finish_coarser(level, band); !ok) return ok;
+            if (auto ok = finish_coarser(level, band, {{0, band.columns}}); !ok) return ok;
+            band.start_next(m_);
         }
         return {};
     }
@@ -245,7 +251,8 @@ private:
             LevelBand& band = levels_[static_cast<std::size_t>(level)];
             if (band.band * lattice_.tile_extent(level) >= lattice_.cells_y) continue;
             repeat_to_end(band);
-            if (auto ok = finish_coarser(level, band); !ok) return ok;
+            if (auto ok = finish_coarser(level, band, {{0, band.columns}}); !ok) return ok;
+            band.start_next(m_);
         }
         return {};
     }
@@ -259,16 +266,107 @@ private:
         }
     }
 
+    // --- a sparse spool: only tiles that files may reach are looked at, with the same outcome ---
+
+    Result<void> make_covered() {
+        if (auto ok = gather_covered_corners(); !ok) return ok;
+        const int deepest = lattice_.deepest_level;
+        const std::int64_t bands = (lattice_.cells_y + m_ - 1) / m_;
+        for (std::int64_t y = 0; y < bands; ++y) {
+            for (std::int64_t j = y * m_ + (y > 0 ? 1 : 0);
+                 job_.on_rows && j <= std::min((y + 1) * m_, lattice_.cells_y); ++j)
+                if (!job_.on_rows(j + 1)) return Error{ErrorCode::interrupted, "stopped"};
+            for (int level = deepest; level >= 0; --level) {
+                const int down = deepest - level;
+                const bool last = y + 1 == bands || (y + 1) % (std::int64_t{1} << down) == 0;
+                if (!last) break;
+                if (auto ok = make_covered_band(level, y >> down); !ok) return ok;
+            }
+        }
+        return {};
+    }
+
+    Result<void> make_covered_band(int level, std::int64_t y) {
+        const Coverage::Runs& runs = job_.coverage->tiles(level, y);
+        LevelBand& band = levels_[static_cast<std::size_t>(level)];
+        band.band = y;
+        if (!runs.empty()) {
+            if (auto ok = read_covered_rows(level, band, runs); !ok) return ok;
+            auto made = level == lattice_.deepest_level ? emit_deepest(band, runs) : finish_coarser(level, band, runs);
+            if (!made) return made;
+        }
+        // What comes next: tiles note what they are in the band above.
+        band.band = y + 1;
+        if (!runs.empty()) std::vector<ParentRecord>(band.parents.size()).swap(band.parents);
+        return {};
+    }
+
+    Result<void> read_covered_rows(int level, LevelBand& band, const Coverage::Runs& runs) {
+        std::mutex mutex;
+        Result<void> outcome;
+        tbb::parallel_for(std::int64_t{0}, m_ + 1, [&](std::int64_t r) {
+            const StageClock::Scope clock(Stage::encode);
+            QuantizedRange range;
+            auto ok = read_covered_row(level, band, runs, r, range);
+            const std::lock_guard lock(mutex);
+            range_.include(range);
+            if (!ok) outcome = ok;
+        });
+        return outcome;
+    }
+
+    // Beyond the data's extent its border goes on, absent.
+    Result<void> read_covered_row(int level, LevelBand& band, const Coverage::Runs& runs, std::int64_t r,
+                                  QuantizedRange& range) {
+        thread_local HeightSpool::SparseRow row;
+        const std::int64_t j = (band.band * m_ + r) * band.step;
+        if (auto ok = job_.spool->read_sparse(std::min(j, lattice_.cells_y), row); !ok) return ok;
+        const bool deepest = level == lattice_.deepest_level;
+        for (const auto& [begin, end] : runs)
+            for (std::int64_t c = begin * m_; c <= end * m_; ++c) {
+                const std::int64_t i = std::min(c * band.step, lattice_.cells_x);
+                const double raw = row.at(i);
+                const std::int32_t n = job_.quantizer.quantize(raw);
+                band.samples[static_cast<std::size_t>(r * band.width + c)] = n;
+                if (!deepest || c > lattice_.cells_x) continue;
+                const bool valid = j <= lattice_.cells_y && row.valid(i);
+                valid_[static_cast<std::size_t>(r * width_ + c)] = static_cast<std::uint8_t>(valid);
+                if (valid) range.include({n, n, job_.quantizer.error_m(raw)});
+            }
+        return {};
+    }
+
+    // Those that a coarsest block of a tile above the deepest level has.
+    Result<void> gather_covered_corners() {
+        HeightSpool::SparseRow row;
+        for (int level = 0; level < lattice_.deepest_level; ++level) {
+            const std::int64_t stride = lattice_.tile_extent(level) / 2 / m_;  // corners
+            for (const auto& [y, runs] : job_.coverage->rows(level))
+                for (std::int64_t k = 0; k <= 2; ++k) {
+                    const std::int64_t r = std::min((2 * y + k) * stride, corners_.rows() - 1);
+                    if (auto ok = job_.spool->read_sparse(std::min(r * m_, lattice_.cells_y), row); !ok) return ok;
+                    for (const auto& [begin, end] : runs)
+                        for (std::int64_t x = 2 * begin; x <= 2 * end; ++x) {
+                            const std::int64_t c = std::min(x * stride, corners_.columns() - 1);
+                            corners_.at(c, r) = job_.quantizer.quantize(row.at(std::min(c * m_, lattice_.cells_x)));
+                        }
+                }
+        }
+        return {};
+    }
+
     // --- deepest tiles ---
 
-    Result<void> emit_deepest(LevelBand& band) {
+    Result<void> emit_deepest(LevelBand& band, const Coverage::Runs& runs) {
         records_.clear();
         records_.resize(static_cast<std::size_t>(band.columns));
-        const std::int64_t chunk = tiles_at_once(n_), chunks = (band.columns + chunk - 1) / chunk;
-        const bool all_valid = std::memchr(valid_.data(), 0, valid_.size()) == nullptr;
-        tbb::parallel_for(std::int64_t{0}, chunks, [&](std::int64_t k) {
-            make_deepest(band, k * chunk, std::min((k + 1) * chunk, band.columns), all_valid);
-        });
+        const std::int64_t chunk = tiles_at_once(n_);
+        const bool all_valid = job_.coverage == nullptr && std::memchr(valid_.data(), 0, valid_.size()) == nullptr;
+        for (const auto& [begin, end] : runs)
+            tbb::parallel_for(
+                std::int64_t{0}, (end - begin + chunk - 1) / chunk, [&, first = begin, last = end](std::int64_t k) {
+                    make_deepest(band, first + k * chunk, std::min(first + (k + 1) * chunk, last), all_valid);
+                });
         for (std::int64_t x = 0; x < band.columns; ++x) {
             TileRecord& record = records_[static_cast<std::size_t>(x)];
             if (!record.outcome) return record.outcome;
@@ -459,19 +557,20 @@ private:
 
     // --- coarser tiles ---
 
-    Result<void> finish_coarser(int level, LevelBand& band) {
+    Result<void> finish_coarser(int level, LevelBand& band, const Coverage::Runs& runs) {
         records_.clear();
         records_.resize(static_cast<std::size_t>(band.columns));
-        const std::int64_t chunk = tiles_at_once(n_), chunks = (band.columns + chunk - 1) / chunk;
-        tbb::parallel_for(std::int64_t{0}, chunks, [&](std::int64_t k) {
-            const StageClock::Scope clock(Stage::encode);
-            for (std::int64_t x = k * chunk; x < std::min((k + 1) * chunk, band.columns); ++x)
-                make_coarser(band, x, records_[static_cast<std::size_t>(x)]);
-        });
+        const std::int64_t chunk = tiles_at_once(n_);
+        for (const auto& [begin, end] : runs)
+            tbb::parallel_for(
+                std::int64_t{0}, (end - begin + chunk - 1) / chunk, [&, first = begin, last = end](std::int64_t k) {
+                    const StageClock::Scope clock(Stage::encode);
+                    for (std::int64_t x = first + k * chunk; x < std::min(first + (k + 1) * chunk, last); ++x)
+                        make_coarser(band, x, records_[static_cast<std::size_t>(x)]);
+                });
         for (std::int64_t x = 0; x < band.columns; ++x)
             if (TileRecord& record = records_[static_cast<std::size_t>(x)]; record.exists)
                 if (auto ok = store({level, x, band.band}, record, false); !ok) return ok;
-        band.start_next(m_);
         return {};
     }
 

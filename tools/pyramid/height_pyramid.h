@@ -32,6 +32,7 @@ struct HeightPyramidJob {
     Lattice finest{};
     HeightCodec codec = HeightCodec::plane;
     const TextureDepth* textures = nullptr;  ///< tiles say where these end. Null: of no consequence
+    const Coverage* coverage = nullptr;      ///< of a sparse spool; else null
     HeightIndex* index = nullptr;            ///< notes every tile; null: nobody wants to know
 };
 

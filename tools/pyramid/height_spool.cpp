@@ -125,12 +125,14 @@ void support_row(std::span<T> row) {
 
 HeightSpool::Descriptor::~Descriptor() { ::close(fd); }
 
-HeightSpool::HeightSpool(int fd, std::string path, std::int64_t width, std::int64_t height, bool wide)
+HeightSpool::HeightSpool(int fd, std::string path, std::int64_t width, std::int64_t height, bool wide,
+                         const Coverage* coverage)
     : file_{fd},
       path_(std::move(path)),
       width_(width),
       height_(height),
       wide_(wide),
+      coverage_(coverage == nullptr || coverage->everything() ? nullptr : coverage),
       row_bytes_(width * bytes_of_sample(wide)) {}
 
 std::int64_t HeightSpool::bytes_needed(std::int64_t width, std::int64_t height, bool wide) {
@@ -138,40 +140,62 @@ std::int64_t HeightSpool::bytes_needed(std::int64_t width, std::int64_t height, 
 }
 
 Result<std::unique_ptr<HeightSpool>> HeightSpool::create(const std::string& path, std::int64_t width,
-                                                         std::int64_t height, bool wide) {
+                                                         std::int64_t height, bool wide, const Coverage* coverage) {
     std::string name = path + ".XXXXXX";
     const int fd = ::mkostemp(name.data(), O_CLOEXEC);
     if (fd < 0) return io_error(path, "cannot create");
     ::unlink(name.c_str());
-    return std::unique_ptr<HeightSpool>(new HeightSpool(fd, path, width, height, wide));
+    return std::unique_ptr<HeightSpool>(new HeightSpool(fd, path, width, height, wide, coverage));
 }
 
 template <class T>
-void HeightSpool::note_row(std::span<const T> row) {
-    ValueRange<T> range = range_of_values(row);
-    std::size_t finite = row.size();
+void HeightSpool::note_values(std::span<const T> values, std::size_t& finite) {
+    ValueRange<T> range = range_of_values(values);
+    std::size_t count = values.size();
     if (!range.all_finite) {
         range = {};
-        finite = 0;
-        for (const T v : row) {
+        count = 0;
+        for (const T v : values) {
             if (!std::isfinite(v)) continue;
-            ++finite;
+            ++count;
             range.low = std::min(range.low, v);
             range.high = std::max(range.high, v);
         }
     }
+    finite += count;
+    if (count == 0) return;
+    const auto low = static_cast<double>(range.low), high = static_cast<double>(range.high);
+    summary_.min_raw = summary_.valid_samples == 0 ? low : std::min(summary_.min_raw, low);
+    summary_.max_raw = summary_.valid_samples == 0 ? high : std::max(summary_.max_raw, high);
+    summary_.valid_samples += static_cast<std::int64_t>(count);
+}
+
+void HeightSpool::note_row(std::size_t finite) {
     if (finite > 0) {
-        const auto low = static_cast<double>(range.low), high = static_cast<double>(range.high);
-        summary_.min_raw = summary_.valid_samples == 0 ? low : std::min(summary_.min_raw, low);
-        summary_.max_raw = summary_.valid_samples == 0 ? high : std::max(summary_.max_raw, high);
-        summary_.valid_samples += static_cast<std::int64_t>(finite);
         last_supporting_ = static_cast<std::int64_t>(rows_.size());
         if (first_supporting_ < 0) first_supporting_ = last_supporting_;
     }
-    rows_.push_back(finite == row.size() ? RowState::all_valid
-                    : finite > 0         ? RowState::some_valid
-                                         : RowState::none_valid);
+    rows_.push_back(finite == static_cast<std::size_t>(width_) ? RowState::all_valid
+                    : finite > 0                               ? RowState::some_valid
+                                                               : RowState::none_valid);
     supporting_above_.push_back(last_supporting_);
+}
+
+Result<void> HeightSpool::append_covered(std::span<const double> row) {
+    assert(sparse());
+    const auto j = static_cast<std::int64_t>(rows_.size());
+    std::size_t finite = 0;
+    if (row.empty()) {
+        note_row(finite);
+        return {};
+    }
+    for (const auto& [begin, end] : covered(j)) {
+        const auto values = row.subspan(static_cast<std::size_t>(begin), static_cast<std::size_t>(end - begin));
+        note_values(values, finite);
+        if (auto ok = write_file(begin, j, values); !ok) return ok;
+    }
+    note_row(finite);
+    return {};
 }
 
 template <class T>
@@ -181,7 +205,9 @@ Result<void> HeightSpool::append_rows(std::span<const T> rows) {
     const std::int64_t offset = static_cast<std::int64_t>(rows_.size()) * row_bytes_;
     bool all_valid = true;
     for (auto rest = rows; !rest.empty(); rest = rest.subspan(width)) {
-        note_row(rest.first(width));
+        std::size_t finite = 0;
+        note_values(rest.first(width), finite);
+        note_row(finite);
         all_valid = all_valid && rows_.back() == RowState::all_valid;
     }
     assert(static_cast<std::int64_t>(rows_.size()) <= height_);
@@ -215,6 +241,68 @@ std::int64_t HeightSpool::supporting_row(std::int64_t j) const {
 
 template <class T>
 Result<void> HeightSpool::read_stored(std::int64_t i, std::int64_t j, std::span<T> out) const {
+    if (!sparse()) return read_file(i, j, out);
+    std::fill(out.begin(), out.end(), static_cast<T>(kUncoveredSample));
+    for (const auto& [first, last] : covered(j)) {
+        const std::int64_t begin = std::max(first, i), end = std::min(last, i + static_cast<std::int64_t>(out.size()));
+        if (begin >= end) continue;
+        auto part = out.subspan(static_cast<std::size_t>(begin - i), static_cast<std::size_t>(end - begin));
+        if (auto ok = read_file(begin, j, part); !ok) return ok;
+    }
+    return {};
+}
+
+Result<void> HeightSpool::read_sparse(std::int64_t j, SparseRow& row) const {
+    row.absent_ = rows_[static_cast<std::size_t>(j)] == RowState::none_valid;
+    row.wide_ = wide_;
+    const auto support = support_.find(j);
+    row.support_ = support == support_.end() ? nullptr : &support->second;
+    row.last_ = 0;
+    row.columns_.clear();
+    row.values_.clear();
+    const std::int64_t from = row.absent_ ? supporting_row(j) : j;
+    std::vector<double> part;
+    for (const auto& [begin, end] : covered(from)) {
+        part.resize(static_cast<std::size_t>(end - begin));
+        if (auto ok = read_file<double>(begin, from, part); !ok) return ok;
+        for (std::size_t k = 0; k < part.size(); ++k) {
+            if (!std::isfinite(part[k])) continue;
+            row.columns_.push_back(begin + static_cast<std::int64_t>(k));
+            row.values_.push_back(part[k]);
+        }
+    }
+    return {};
+}
+
+std::size_t HeightSpool::SparseRow::first_from(std::int64_t i) const {
+    for (const std::size_t k : {last_, last_ + 1})
+        if (k <= columns_.size() && (k == 0 || columns_[k - 1] < i) && (k == columns_.size() || columns_[k] >= i))
+            return last_ = k;
+    return last_ = static_cast<std::size_t>(std::lower_bound(columns_.begin(), columns_.end(), i) - columns_.begin());
+}
+
+bool HeightSpool::SparseRow::valid(std::int64_t i) const {
+    const std::size_t k = first_from(i);
+    return !absent_ && k < columns_.size() && columns_[k] == i;
+}
+
+// As support_row has it.
+double HeightSpool::SparseRow::at(std::int64_t i) const {
+    const std::size_t k = first_from(i);
+    const bool on_sample = k < columns_.size() && columns_[k] == i;
+    if (on_sample && !absent_) return values_[k];
+    const auto rounded = [&](double v) { return wide_ ? v : static_cast<double>(static_cast<float>(v)); };
+    if (support_ != nullptr)
+        if (const auto known = support_->find(i); known != support_->end()) return rounded(known->second);
+    if (on_sample) return values_[k];
+    if (k == 0) return values_.front();
+    if (k == columns_.size()) return values_.back();
+    const double a = values_[k - 1], b = values_[k], span = static_cast<double>(columns_[k] - columns_[k - 1]);
+    return rounded(a + (b - a) * (static_cast<double>(i - columns_[k - 1]) / span));
+}
+
+template <class T>
+Result<void> HeightSpool::read_file(std::int64_t i, std::int64_t j, std::span<T> out) const {
     const std::int64_t offset = j * row_bytes_ + i * bytes_of_sample(wide_);
     if (wide_ == std::is_same_v<T, double>) return read_at(file_.fd, path_, writable_bytes_of(out), offset);
     const auto convert = [&](auto stored) -> Result<void> {
@@ -273,6 +361,18 @@ Result<void> HeightSpool::read_window(std::int64_t i, std::int64_t j, std::int64
                                       std::span<double> values, std::span<std::uint8_t> valid) const {
     assert(i >= 0 && j >= 0 && i + columns <= width_ && j + rows <= height_);
     const auto width = static_cast<std::size_t>(columns);
+    if (sparse()) {
+        SparseRow row;
+        std::size_t k = 0;
+        for (std::int64_t r = 0; r < rows; ++r) {
+            if (auto ok = read_sparse(j + r, row); !ok) return ok;
+            for (std::int64_t c = 0; c < columns; ++c, ++k) {
+                values[k] = row.at(i + c);
+                valid[k] = static_cast<std::uint8_t>(row.valid(i + c));
+            }
+        }
+        return {};
+    }
     std::vector<double> whole;
     std::vector<std::uint8_t> whole_valid;
     for (std::int64_t r = 0; r < rows; ++r) {
@@ -323,6 +423,18 @@ Result<void> HeightSpool::read_samples(std::int64_t i, std::int64_t j, std::span
 Result<void> HeightSpool::write_samples(std::int64_t i, std::int64_t j, std::span<const double> values) {
     assert(i >= 0 && i + static_cast<std::int64_t>(values.size()) <= width_ && j >= 0 && j < height_);
     assert(rows_[static_cast<std::size_t>(j)] != RowState::none_valid);
+    if (!sparse()) return write_file(i, j, values);
+    for (const auto& [first, last] : covered(j)) {
+        const std::int64_t begin = std::max(first, i),
+                           end = std::min(last, i + static_cast<std::int64_t>(values.size()));
+        if (begin >= end) continue;
+        auto part = values.subspan(static_cast<std::size_t>(begin - i), static_cast<std::size_t>(end - begin));
+        if (auto ok = write_file(begin, j, part); !ok) return ok;
+    }
+    return {};
+}
+
+Result<void> HeightSpool::write_file(std::int64_t i, std::int64_t j, std::span<const double> values) {
     const std::int64_t offset = j * row_bytes_ + i * bytes_of_sample(wide_);
     if (wide_) {
         const auto record = scratch().doubles(values.size());

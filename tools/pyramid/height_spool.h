@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "common/result.h"
+#include "tools/pyramid/coverage.h"
 
 namespace scree {
 
@@ -37,15 +38,21 @@ public:
     };
 
     /// A file of a new name that begins with `path`, unlinked at once: it vanishes with the process. `wide`: values do
-    /// not fit float32.
+    /// not fit float32. `coverage`: samples outside are uncovered and take no room; null: all may be covered. It must
+    /// outlive the spool.
     static Result<std::unique_ptr<HeightSpool>> create(const std::string& path, std::int64_t width, std::int64_t height,
-                                                       bool wide);
+                                                       bool wide, const Coverage* coverage = nullptr);
     static std::int64_t bytes_needed(std::int64_t width, std::int64_t height, bool wide);
 
     /// Appends the next row, or several: -infinity marks an uncovered sample, NaN and +infinity a void. Floats only
     /// where the spool is not wide.
     Result<void> append(std::span<const double> rows);
     Result<void> append(std::span<const float> rows);
+    /// One row, of which only what the coverage has is looked at. Empty: no file reaches it.
+    Result<void> append_covered(std::span<const double> row);
+    bool sparse() const { return coverage_ != nullptr; }
+    /// Samples of row j that may be covered. Of a sparse spool.
+    Coverage::Runs covered(std::int64_t j) const { return coverage_->samples(j); }
     /// After the last row. Errors: ErrorCode::input when no sample is valid.
     Result<Summary> finish();
 
@@ -59,6 +66,25 @@ public:
     /// Samples [i, i + columns) x [j, j + rows) as read_row gives them.
     Result<void> read_window(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
                              std::span<double> values, std::span<std::uint8_t> valid) const;
+
+    /// A row of a sparse spool: any sample as read_row gives it. Valid while the spool is; for one thread.
+    class SparseRow {
+    public:
+        double at(std::int64_t i) const;
+        bool valid(std::int64_t i) const;
+
+    private:
+        friend class HeightSpool;
+        /// Of the first valid sample that is not west of i. Rows are mostly read from west to east.
+        std::size_t first_from(std::int64_t i) const;
+
+        mutable std::size_t last_ = 0;
+        bool absent_ = false, wide_ = false;
+        std::vector<std::int64_t> columns_;  // of valid samples, of the supporting row where this one has none
+        std::vector<double> values_;
+        const std::map<std::int64_t, double>* support_ = nullptr;
+    };
+    Result<void> read_sparse(std::int64_t j, SparseRow& row) const;
 
     /// False: every sample of row j was valid when it was appended.
     bool may_lack_samples(std::int64_t j) const;
@@ -78,9 +104,13 @@ public:
 private:
     enum class RowState : std::uint8_t { all_valid, some_valid, none_valid };
 
-    HeightSpool(int fd, std::string path, std::int64_t width, std::int64_t height, bool wide);
+    HeightSpool(int fd, std::string path, std::int64_t width, std::int64_t height, bool wide, const Coverage* coverage);
     template <class T>
-    void note_row(std::span<const T> row);
+    Result<void> read_file(std::int64_t i, std::int64_t j, std::span<T> out) const;
+    template <class T>
+    void note_values(std::span<const T> values, std::size_t& finite);
+    void note_row(std::size_t finite);
+    Result<void> write_file(std::int64_t i, std::int64_t j, std::span<const double> values);
     template <class T>
     Result<void> append_rows(std::span<const T> rows);
     /// The row whose values stand under row j where that has none.
@@ -100,6 +130,7 @@ private:
     std::string path_;
     std::int64_t width_, height_;
     bool wide_;
+    const Coverage* coverage_;
     std::int64_t row_bytes_;
     std::vector<RowState> rows_;  ///< of the rows appended so far
     Summary summary_;

@@ -65,11 +65,24 @@ Result<void> spool_stack(const BuildPlan& plan, const HeightStack& stack, Height
     auto grid =
         stack.on(grid_of(plan.mosaic.base_lattice()), plan.mosaic.crs, std::ldexp(1.0, -plan.mosaic.base_shift));
     if (!grid) return grid.error();
-    RowBands<double> bands(spool.width(),
-                           [&](std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
-                               std::span<double> out) { return (*grid)->sample(i, j, columns, rows, 1, out); });
+    const auto make = [&](std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
+                          std::span<double> out) { return (*grid)->sample(i, j, columns, rows, 1, out); };
+    const auto reached = [&](std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows) {
+        return plan.coverage.reaches(i, j, columns, rows);
+    };
+    RowBands<double> bands(spool.width(), make, spool.sparse() ? reached : RowBands<double>::Wanted());
     for (std::int64_t j = 0; j < spool.height(); ++j) {
         if (stop) return interrupted();
+        if (spool.sparse()) {
+            std::span<const double> row;
+            if (!spool.covered(j).empty()) {
+                auto values = bands.row(j);
+                if (!values) return values.error();
+                row = *values;
+            }
+            if (auto ok = spool.append_covered(row); !ok) return ok;
+            continue;
+        }
         auto values = bands.row(j);
         if (!values) return values.error();
         if (auto ok = spool.append(*values); !ok) return ok;
@@ -163,7 +176,7 @@ Result<HeightStageResult> build_heights(const BuildPlan& plan, const BuildOption
                                         HeightIndex& index, Progress& progress, const std::atomic<bool>& stop) {
     const Lattice lattice = plan.mosaic.base_lattice();
     const std::int64_t width = lattice.cells_x + 1, height = lattice.cells_y + 1;
-    auto spool = HeightSpool::create(options.out + ".heights", width, height, plan.wide_heights);
+    auto spool = HeightSpool::create(options.out + ".heights", width, height, plan.wide_heights, &plan.coverage);
     if (!spool) return spool.error();
     std::unique_ptr<HeightStack> stack;
     if (!plan.heights_in_place) {
@@ -217,6 +230,7 @@ Result<HeightStageResult> build_heights(const BuildPlan& plan, const BuildOption
         return !stop.load();
     };
     job.index = &index;
+    job.coverage = plan.coverage.everything() ? nullptr : &plan.coverage;
     job.finest = plan.dataset.lattice;
     job.textures = &plan.textures;
     job.codec = options.height_codec;

@@ -21,7 +21,10 @@ public:
     /// Makes the rectangle [i, i + columns) x [j, j + rows), row-major; called from several threads.
     using Make = std::function<Result<void>(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows,
                                             std::span<T> out)>;
-    RowBands(std::int64_t width, Make make) : width_(width), make_(std::move(make)) {}
+    /// Whether anything of the rectangle will be looked at; what is not is not made. Null: all is.
+    using Wanted = std::function<bool(std::int64_t i, std::int64_t j, std::int64_t columns, std::int64_t rows)>;
+    RowBands(std::int64_t width, Make make, Wanted wanted = nullptr)
+        : width_(width), make_(std::move(make)), wanted_(std::move(wanted)) {}
 
     /// Row r >= 0; cheap in ascending order. Valid until the next call.
     Result<std::span<const T>> row(std::int64_t r) {
@@ -42,6 +45,7 @@ private:
         const std::int64_t parts = (width_ + WarpMap::kChunk - 1) / WarpMap::kChunk;
         tbb::parallel_for(std::int64_t{0}, parts, [&](std::int64_t part) {
             const std::int64_t i = part * WarpMap::kChunk, columns = std::min(WarpMap::kChunk, width_ - i);
+            if (wanted_ && !wanted_(i, band * kRows, columns, kRows)) return;
             std::vector<T> out(static_cast<std::size_t>(columns * kRows));
             if (auto ok = make_(i, band * kRows, columns, kRows, out); !ok) {
                 const std::lock_guard lock(mutex);
@@ -57,6 +61,7 @@ private:
 
     std::int64_t width_;
     Make make_;
+    Wanted wanted_;
     std::int64_t band_ = -1;
     std::vector<T> values_;
 };

@@ -16,6 +16,7 @@ public:
     /// Tiles [begin, end) of a row.
     struct Run {
         std::int64_t begin = 0, end = 0;
+        friend bool operator==(const Run&, const Run&) = default;
     };
     using Runs = std::vector<Run>;
 
@@ -63,5 +64,20 @@ private:
     int size_log2_ = 8, least_ = 0, deepest_ = 0, coarsest_ = 0;
     std::map<int, Rows> refined_;  // by level; none above coarsest_
 };
+
+/// The parts of runs whose tiles `is_wanted` says yes to.
+template <class Wanted>
+TextureDepth::Runs runs_where(const TextureDepth::Runs& runs, const Wanted& is_wanted) {
+    TextureDepth::Runs parts;
+    for (const auto& [begin, end] : runs)
+        for (std::int64_t x = begin; x < end; ++x) {
+            if (!is_wanted(x)) continue;
+            if (!parts.empty() && parts.back().end == x)
+                ++parts.back().end;
+            else
+                parts.push_back({x, x + 1});
+        }
+    return parts;
+}
 
 }  // namespace scree

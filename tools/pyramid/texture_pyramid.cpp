@@ -71,11 +71,12 @@ struct TexturePyramid::Impl {
     // Which of a level's tiles the runs are wanted of, in pixels of the rectangle; `row`: of the level, within it.
     using Choice = Runs (TextureDepth::*)(int, std::int64_t, std::int64_t, std::int64_t) const;
     Runs pixel_runs(const Level& level, std::int64_t row, Choice choice) const {
-        if (!varies(level)) return {{0, level.width}};
+        if (!makes_tiles(level)) return {{0, level.width}};
         const int down = level.id - job.root_level;
-        const std::int64_t first = job.first_column << down;
-        Runs runs =
-            (job.depth->*choice)(level.id, (job.first_row << down) + row / size, first, first + level.width / size);
+        const std::int64_t first = job.first_column << down, y = (job.first_row << down) + row / size;
+        Runs runs{{first, first + level.width / size}};
+        if (varies(level)) runs = (job.depth->*choice)(level.id, y, first, first + level.width / size);
+        if (job.has_heights) runs = runs_where(runs, [&](std::int64_t x) { return job.has_heights({level.id, x, y}); });
         for (TextureDepth::Run& run : runs) run = {(run.begin - first) * size, (run.end - first) * size};
         return runs;
     }
@@ -101,10 +102,9 @@ struct TexturePyramid::Impl {
             tbb::parallel_for(std::int64_t{0}, chunks, stretch);
         else
             stretch(0);
-        if (next == nullptr || next->width == level.width / 2) return;
+        if (next == nullptr) return;
         for (std::int64_t r = next->gathered; r < next->gathered + level.gathered / 2; ++r)
-            std::memset(next->row(r) + level.width / 2 * 4, 0,
-                        static_cast<std::size_t>((next->width - level.width / 2) * 4));
+            clear_between(halved, level.width / 2, next->width, next->row(r));
     }
 
     void encode(Level& level, const TextureDepth::Run& run) const {
@@ -139,6 +139,19 @@ struct TexturePyramid::Impl {
         level.rows_done += level.gathered;
         if (next != nullptr && next->gathered == next->capacity) return process(index + 1);
         return {};
+    }
+
+    // The pixels of a row that no run has, and those beyond `width`.
+    static void clear_between(const Runs& runs, std::int64_t width, std::int64_t all, std::uint8_t* row) {
+        std::int64_t at = 0;
+        const auto clear_to = [&](std::int64_t end) {
+            if (end > at) std::memset(row + at * 4, 0, static_cast<std::size_t>((end - at) * 4));
+        };
+        for (const auto& [begin, end] : runs) {
+            clear_to(std::min(begin, width));
+            at = std::min(end, width);
+        }
+        clear_to(all);
     }
 
     void keep_seeds(const Level& level) {

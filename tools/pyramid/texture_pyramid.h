@@ -29,6 +29,8 @@ struct TexturePyramidJob {
     std::int64_t first_column = 0, first_row = 0, columns = kMaxCellsPerSide, rows = kMaxCellsPerSide;
     /// Tiles that are stored whatever they show, by address. Any thread.
     std::function<bool(TileId id)> stored;
+    /// Tiles over which there are heights; others show nothing, and no work is done for them. Any thread. Null: all.
+    std::function<bool(TileId id)> has_heights;
     /// Deeper than this level (the deepest of the dense heights) a tile is stored also where it shows anything.
     int shared_levels = 0;
     /// Which children of a tile of deepest_level are stored: 0 where that is the texture's depth. Any thread.

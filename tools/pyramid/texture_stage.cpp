@@ -78,7 +78,8 @@ public:
         const std::int64_t first = (piece_.first_column << (level - piece_.root_level)) * size_;
         if (level == piece_.deepest_level && level < depth_.deepest())
             if (auto ok = copy_below(row, rows, columns, rgba); !ok) return ok;
-        const auto leaves = leaves_of(level, row, first, columns);
+        const auto all = leaves_of(level, row, first, columns), leaves = with_heights(level, row, all);
+        if (leaves != all) clear(all, first, rows, columns, rgba);
         if (leaves.empty()) return {};
         ImageStack* imagery = job.imagery == nullptr ? nullptr : job.imagery->at(level);
         if (imagery != nullptr)
@@ -122,6 +123,21 @@ private:
         return runs;
     }
 
+    // Those parts of runs of pixels, in whole tiles, over which there are heights.
+    TextureDepth::Runs with_heights(int level, std::int64_t row, TextureDepth::Runs runs) const {
+        for (TextureDepth::Run& run : runs) run = {run.begin / size_, run.end / size_};
+        runs = runs_where(runs, [&](std::int64_t x) { return stage_.has_heights({level, x, row / size_}); });
+        for (TextureDepth::Run& run : runs) run = {run.begin * size_, run.end * size_};
+        return runs;
+    }
+
+    void clear(const TextureDepth::Runs& runs, std::int64_t first, std::int64_t rows, std::int64_t columns,
+               std::uint8_t* rgba) const {
+        for (const auto& [begin, end] : runs)
+            for (std::int64_t r = 0; r < rows; ++r)
+                std::memset(rgba + (r * columns + begin - first) * 4, 0, static_cast<std::size_t>((end - begin) * 4));
+    }
+
     // Rows are made ready before they are sampled, more of them at a time.
     Result<void> prepare(ImageStack& imagery, int level, std::int64_t row, std::int64_t first, std::int64_t columns) {
         std::int64_t& prepared_end = prepared_end_[static_cast<std::size_t>(level - piece_.root_level)];
@@ -134,7 +150,7 @@ private:
         for (std::int64_t top = row; top < end;) {
             // Tiles of a row have the same leaves throughout; where the depth does not vary, all rows have.
             const std::int64_t bottom = depth_.varies() ? std::min((top / size_ + 1) * size_, end) : end;
-            for (const auto& [begin, last] : leaves_of(level, top, first, columns))
+            for (const auto& [begin, last] : with_heights(level, top, leaves_of(level, top, first, columns)))
                 if (auto ok = imagery.prepare(begin, top, last - begin, bottom - top, go_on); !ok) return ok;
             top = bottom;
         }
@@ -276,6 +292,7 @@ Result<std::unique_ptr<TexturePyramid>> TextureStage::build_piece(const Rectangl
     job.rows = rectangle.rows;
     job.quality = job_.quality;
     job.stored = [&](TileId id) { return job_.index->stored(id); };
+    job.has_heights = [&](TileId id) { return has_heights(id); };
     job.shared_levels = job_.base.deepest_level;
     job.sink = [&](TileId id, std::vector<std::uint8_t> payload) { return sink(id, std::move(payload)); };
     Piece piece(*this, rectangle);
@@ -369,14 +386,21 @@ Result<void> TextureStage::build_districts(std::int64_t first_column, std::int64
     // Seeds of deep districts are read back.
     if (job_.depth->varies())
         if (auto ok = job_.writer->flush(); !ok) return ok;
-    auto pyramid = build_piece({seed_level(d), coarsest_, first_column, first_row, columns, rows});
+    for (std::int64_t y = first_row; y < first_row + rows; ++y)
+        for (const TextureDepth::Run& run : runs_where({{first_column, first_column + columns}}, [&](std::int64_t x) {
+                 return has_heights({seed_level(d), x, y});
+             }))
+            if (auto ok = build_district_run(run, y); !ok) return ok;
+    return {};
+}
+
+Result<void> TextureStage::build_district_run(const TextureDepth::Run& run, std::int64_t y) {
+    const Dataset& d = job_.dataset;
+    auto pyramid = build_piece({seed_level(d), coarsest_, run.begin, y, run.end - run.begin, 1});
     if (!pyramid) return pyramid.error();
     if (seed_level(d) == 0) return {};
-    const std::int64_t size = d.texture_size();
-    const TexturePyramid::Seeds& seeds = (*pyramid)->seeds();
-    for (std::int64_t y = 0; y < seeds.rows / size; ++y)
-        for (std::int64_t x = 0; x < seeds.columns / size; ++x)
-            if (auto ok = put_seed(**pyramid, {seed_level(d), first_column + x, first_row + y}, x, y); !ok) return ok;
+    for (std::int64_t x = run.begin; x < run.end; ++x)
+        if (auto ok = put_seed(**pyramid, {seed_level(d), x, y}, x - run.begin, 0); !ok) return ok;
     return {};
 }
 

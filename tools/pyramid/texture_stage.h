@@ -65,6 +65,7 @@ private:
     struct Rectangle;
     class Piece;
     Result<std::unique_ptr<class TexturePyramid>> build_piece(const Rectangle& piece);
+    Result<void> build_district_run(const TextureDepth::Run& run, std::int64_t y);
     Result<void> build_run(int level, std::int64_t row, TextureDepth::Run run,
                            const std::function<Result<void>(const TexturePyramid& pyramid, std::int64_t first_column,
                                                             std::int64_t columns)>& use);

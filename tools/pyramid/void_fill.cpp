@@ -33,7 +33,7 @@ public:
             if (auto ok = write_back(slot); !ok) return ok.error();
             slot.row = -1;
             slot.values.resize(static_cast<std::size_t>(spool_.width()));
-            if (auto ok = spool_.read_samples(0, j, slot.values); !ok) return ok.error();
+            if (auto ok = read(j, slot.values); !ok) return ok.error();
             slot.row = j;
         }
         return std::span<double>(slot.values);
@@ -55,6 +55,15 @@ private:
         bool changed = false;
         std::vector<double> values;
     };
+    // Of a sparse row what files may reach; the rest is never looked at.
+    Result<void> read(std::int64_t j, std::vector<double>& values) const {
+        if (!spool_.sparse()) return spool_.read_samples(0, j, values);
+        for (const auto& [begin, end] : spool_.covered(j)) {
+            const std::span part(values.data() + begin, static_cast<std::size_t>(end - begin));
+            if (auto ok = spool_.read_samples(begin, j, part); !ok) return ok;
+        }
+        return {};
+    }
     Result<void> write_back(Slot& slot) {
         if (!slot.changed) return {};
         slot.changed = false;
@@ -75,6 +84,7 @@ public:
 
 private:
     bool stopped() const { return keep_going_ && !keep_going_(); }
+    Result<void> add_sparse(VoidRegions& regions, std::int64_t j);
     Result<void> take(std::span<const VoidRegion> closed);
     Result<void> fill(const VoidRegion& region);
     bool is_cached(const VoidRegion& region) const { return region.window_height() <= cache_.rows(); }
@@ -93,6 +103,7 @@ private:
     std::vector<std::uint8_t> unknown_;  // 1: the region's
     double lowest_ = INFINITY, highest_ = -INFINITY;
     FillReport report_;
+    bool last_was_empty_ = false;
 };
 
 Error interrupted() { return {ErrorCode::interrupted, "stopped while voids were filled"}; }
@@ -102,7 +113,10 @@ Result<FillReport> VoidFiller::run() {
     bool any_open = false;
     for (std::int64_t j = 0; j < spool_.height(); ++j) {
         if (j % 64 == 0 && stopped()) return interrupted();
-        if (spool_.may_lack_samples(j)) {
+        if (spool_.sparse()) {
+            if (auto ok = add_sparse(regions, j); !ok) return ok.error();
+            any_open = true;
+        } else if (spool_.may_lack_samples(j)) {
             auto row = cache_.row(j);
             if (!row) return row.error();
             if (auto ok = take(regions.add_row(j, *row)); !ok) return ok.error();
@@ -119,6 +133,18 @@ Result<FillReport> VoidFiller::run() {
         report_.max_raw = highest_;
     }
     return report_;
+}
+
+// Rows that no file reaches are alike: only the first after one that files do reach is told of.
+Result<void> VoidFiller::add_sparse(VoidRegions& regions, std::int64_t j) {
+    const Coverage::Runs covered = spool_.covered(j);
+    const bool empty = covered.empty();
+    if (empty && last_was_empty_) return {};
+    last_was_empty_ = empty;
+    if (empty) return take(regions.add_row(j, {}, covered));
+    auto row = cache_.row(j);
+    if (!row) return row.error();
+    return take(regions.add_row(j, *row, covered));
 }
 
 Result<void> VoidFiller::take(std::span<const VoidRegion> closed) {

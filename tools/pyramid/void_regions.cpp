@@ -28,27 +28,50 @@ std::size_t VoidRegions::root_of(std::size_t region) {
 }
 
 // Every run begins as a region of its own, behind those that the row above left open.
-void VoidRegions::find_runs(std::int64_t j, std::span<const double> row) {
+void VoidRegions::find_runs(std::int64_t j, std::span<const double> row, const Coverage::Runs& covered) {
     runs_.clear();
-    for (std::int64_t i = 0; i < width_;) {
-        if (std::isfinite(row[static_cast<std::size_t>(i)])) {
-            ++i;
-            continue;
-        }
-        VoidRegion region;
+    std::int64_t i = 0;
+    VoidRegion region;
+    const auto begin = [&] {
+        region = {};
         region.west = region.first = i;
         region.north = region.south = j;
-        for (; i < width_ && !std::isfinite(row[static_cast<std::size_t>(i)]); ++i)
-            if (std::isnan(row[static_cast<std::size_t>(i)]))
-                ++region.voids;
-            else
-                region.outside = true;
+    };
+    const auto end = [&] {
         region.east = i - 1;
         region.outside |= j == 0 || j == height_ - 1 || region.west == 0 || i == width_;
         runs_.push_back({region.west, region.east, open_.size()});
         parent_.push_back(open_.size());
         open_.push_back(region);
+    };
+    bool open = false;
+    const auto pass_gap = [&](std::int64_t to) {
+        if (i >= to) return;
+        if (!open) begin();
+        open = region.outside = true;
+        i = to;
+    };
+    for (const Coverage::Run& part : covered) {
+        pass_gap(part.begin);
+        while (i < part.end) {
+            const double v = row[static_cast<std::size_t>(i)];
+            if (std::isfinite(v)) {
+                if (open) end();
+                open = false;
+                ++i;
+                continue;
+            }
+            if (!open) begin();
+            open = true;
+            if (std::isnan(v))
+                ++region.voids;
+            else
+                region.outside = true;
+            ++i;
+        }
     }
+    pass_gap(width_);
+    if (open) end();
 }
 
 void VoidRegions::join_to_row_above() {
@@ -87,7 +110,12 @@ void VoidRegions::keep_open() {
 }
 
 std::span<const VoidRegion> VoidRegions::add_row(std::int64_t j, std::span<const double> row) {
-    find_runs(j, row);
+    return add_row(j, row, {{0, width_}});
+}
+
+std::span<const VoidRegion> VoidRegions::add_row(std::int64_t j, std::span<const double> row,
+                                                 const Coverage::Runs& covered) {
+    find_runs(j, row, covered);
     join_to_row_above();
     keep_open();
     return closed_;

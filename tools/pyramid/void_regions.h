@@ -10,6 +10,8 @@
 #include <span>
 #include <vector>
 
+#include "tools/pyramid/coverage.h"
+
 namespace scree {
 
 struct VoidRegion {
@@ -32,6 +34,8 @@ public:
     /// Row j, after row j - 1: values, NaN for voids, -infinity for uncovered samples. The regions that this row
     /// closes, in the order of their first samples in row j - 1; valid until the next call.
     std::span<const VoidRegion> add_row(std::int64_t j, std::span<const double> row);
+    /// The same where all but some runs is uncovered: nothing else of the row is looked at.
+    std::span<const VoidRegion> add_row(std::int64_t j, std::span<const double> row, const Coverage::Runs& covered);
     /// The same for a row whose every sample is valid, or for the end of the raster.
     std::span<const VoidRegion> add_valid_row();
 
@@ -41,7 +45,7 @@ private:
         std::size_t region;  ///< in open_
     };
     std::size_t root_of(std::size_t region);
-    void find_runs(std::int64_t j, std::span<const double> row);
+    void find_runs(std::int64_t j, std::span<const double> row, const Coverage::Runs& covered);
     void join_to_row_above();
     void keep_open();
 
