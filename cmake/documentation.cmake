@@ -1,11 +1,13 @@
-# Manual pages and completion of a program, written by the program itself from what its --help says.
+# Manual pages and completion (bash, zsh, fish) of a program, written by the program itself from what its --help says.
 find_program(SCREE_GZIP gzip REQUIRED)
 
 function(scree_documentation program)
     set(out ${PROJECT_BINARY_DIR}/documentation)
     set(pages ${program}.1)
     set(commands COMMAND $<TARGET_FILE:${program}> --man-page > ${program}.1
-                 COMMAND $<TARGET_FILE:${program}> --completion > ${program})
+                 COMMAND $<TARGET_FILE:${program}> --completion > ${program}
+                 COMMAND $<TARGET_FILE:${program}> --completion-zsh > _${program}
+                 COMMAND $<TARGET_FILE:${program}> --completion-fish > ${program}.fish)
     foreach(command IN LISTS ARGN)
         list(APPEND pages ${program}-${command}.1)
         list(APPEND commands COMMAND $<TARGET_FILE:${program}> ${command} --man-page > ${program}-${command}.1)
@@ -15,7 +17,7 @@ function(scree_documentation program)
     list(TRANSFORM files PREPEND ${out}/)
     file(MAKE_DIRECTORY ${out})
     add_custom_command(
-        OUTPUT ${files} ${out}/${program}
+        OUTPUT ${files} ${out}/${program} ${out}/_${program} ${out}/${program}.fish
         ${commands}
         COMMAND ${SCREE_GZIP} -9nkf ${pages}
         DEPENDS ${program}
@@ -24,5 +26,7 @@ function(scree_documentation program)
         VERBATIM)
     add_custom_target(${program}-documentation ALL DEPENDS ${files} ${out}/${program})
     install(FILES ${files} DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT ${program})
+    install(FILES ${out}/_${program} DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions COMPONENT ${program})
+    install(FILES ${out}/${program}.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d COMPONENT ${program})
     install(FILES ${out}/${program} DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions COMPONENT ${program})
 endfunction()

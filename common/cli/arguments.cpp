@@ -17,7 +17,8 @@ void add_json_option(CLI::App& app, std::string& file) {
 int parse_arguments(CLI::App& app, int argc, char** argv, const std::vector<std::string>& see_also) {
     const std::string_view only = argc == 2 ? argv[1] : "";
     if (only == "--man-page") return fmt::print("{}", man_page(app, see_also)), 0;
-    if (only == "--completion-case") return fmt::print("{}", completion_case(app)), 0;
+    for (const Shell shell : {Shell::bash, Shell::fish})
+        if (only == completion_flag(shell)) return fmt::print("{}", completion_of(app, shell)), 0;
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {

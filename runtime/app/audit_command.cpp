@@ -159,6 +159,7 @@ AuditFacts facts_of(const Dataset& d, const ViewOptions& o, const AuditOptions& 
     facts.width_px = o.width_px;
     facts.height_px = o.height_px;
     facts.budget_bytes = o.budget_bytes;
+    facts.exaggeration = d.exaggeration;
     facts.height_quantum_error_m = d.height_quantum_error_m;
     facts.warp_error_m = d.warp_error_m;
     for (const std::string& source : a.against) {
@@ -169,7 +170,7 @@ AuditFacts facts_of(const Dataset& d, const ViewOptions& o, const AuditOptions& 
 }
 
 Result<ReportFolder> report_folder(const AuditOptions& a) {
-    return ReportFolder::prepare(a.report, {"index.html", "audit.json"}, a.force);
+    return ReportFolder::prepare(a.report, kAuditReport, a.force);
 }
 
 // Without pictures where they cannot be had: the figures stand by themselves.
@@ -190,14 +191,14 @@ Result<void> write_report(const AuditResult& result, const AuditFacts& facts, co
 }
 
 Result<bool> run_blocks(const ViewOptions& o, const AuditOptions& a) {
-    for (const auto& [given, option] :
-         {std::pair(!a.against.empty(), "--against"), std::pair(!a.report.empty(), "--report")})
-        if (auto ok = refuse_with_blocks(given, option); !ok) return ok.error();
+    if (auto ok = refuse_with_blocks(!a.against.empty(), "--against"); !ok) return ok.error();
+    if (!a.report.empty())
+        if (auto folder = report_folder(a); !folder) return folder.error();
     auto store = open_store(o);
     if (!store) return store.error();
     auto path = flight_of(**store, o, a.frames);
     if (!path) return path.error();
-    return audit_blocks(o, **store, *path);
+    return audit_blocks(o, **store, *path, {a.report, a.force, a.command});
 }
 
 Result<bool> run_tiles(const ViewOptions& o, const AuditOptions& a) {

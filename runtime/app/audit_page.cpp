@@ -118,6 +118,7 @@ std::string settings_table(const AuditFacts& f) {
          f.moving ? "as a flight of 30 frames a second would have drawn them" : "each with all that it wants"},
         {"picture", fmt::format("{} x {}, {:g} degrees", f.width_px, f.height_px, f.fov_deg),
          "size in pixels, vertical field of view"},
+        {"heights", fmt::format("x {:g}", f.exaggeration), "as drawn; errors count in these"},
         {"rounding of heights", fmt::format("{:.3g} m at most", f.height_quantum_error_m),
          "when the store was built; comes on top of errors against the store"},
         {"resampling", fmt::format("{:.3g} m at most", f.warp_error_m), "likewise"},

@@ -20,6 +20,7 @@ nlohmann::ordered_json audit_json(const AuditResult& r, const AuditFacts& facts)
                                      {"frames_with_stand_ins", r.stand_ins},
                                      {"guaranteed", facts.guaranteed},
                                      {"lod", facts.lod},
+                                     {"exaggeration", facts.exaggeration},
                                      {"kept", r.kept}};
     if (!facts.sources.empty())
         report["against"] = {{"sources", facts.sources.size()},

@@ -43,7 +43,7 @@ struct AuditFacts {
     double tau_px = 1, fov_deg = 40;
     int width_px = 0, height_px = 0;
     std::int64_t budget_bytes = 0;
-    double height_quantum_error_m = 0, warp_error_m = 0;
+    double height_quantum_error_m = 0, warp_error_m = 0, exaggeration = 1;
     std::vector<std::string> sources;  ///< judged by as well: names, without folders
 };
 

@@ -4,14 +4,18 @@
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "common/process_usage.h"
 #include "common/report.h"
 #include "runtime/app/block_display.h"
+#include "runtime/app/block_page.h"
 #include "runtime/app/block_scene.h"
 #include "runtime/lod/block_truth.h"
 #include "runtime/render/png.h"
+#include "runtime/report/machine.h"
+#include "runtime/report/report_folder.h"
 #include "runtime/report/statistics.h"
 #include "runtime/scene/frame_governor.h"
 
@@ -31,6 +35,7 @@ double share(std::int64_t part, std::int64_t whole) {
 // What is said of every picture and flight: whether anything is promised, and what of the store is not shown.
 void describe(Json& report, const BlockScene& scene) {
     report["guaranteed"] = scene.promise_px().has_value();
+    report["exaggeration"] = scene.dataset().exaggeration;
     report["complete_triangles"] = scene.world().complete_triangles();
     report["dropped_columns"] = scene.world().dropped_columns();
     report["dropped_rows"] = scene.world().dropped_rows();
@@ -62,10 +67,35 @@ Json shot_report(const BlockScene& scene, const BlockFrame& frame, const FlightP
     return report;
 }
 
-struct FlightLog {
-    Series frame_ms, select_ms, triangles, blocks, strips, tau, bound;
-    Series settled_triangles, settled_bound;
-    std::int64_t drawn = 0, reused = 0, meshes_made = 0, strips_made = 0, upload_bytes = 0, holes = 0;
+BlockFacts facts_of(const BlockScene& scene, const ViewOptions& o, const BlockReport& report) {
+    BlockFacts facts;
+    facts.store = std::filesystem::path(o.store).filename().string();
+    facts.command = report.command;
+    facts.machine = machine_name();
+    facts.lod = command_line_of(o.lod);
+    facts.promise_px = scene.promise_px();
+    facts.tau_px = o.tau_px;
+    facts.fov_deg = o.fov_deg;
+    facts.exaggeration = scene.dataset().exaggeration;
+    facts.width_px = o.width_px;
+    facts.height_px = o.height_px;
+    facts.budget_bytes = o.budget_bytes;
+    facts.resident_bytes = scene.resident_bytes();
+    facts.dropped_columns = scene.world().dropped_columns();
+    facts.dropped_rows = scene.world().dropped_rows();
+    facts.height_quantum_error_m = scene.dataset().height_quantum_error_m;
+    return facts;
+}
+
+PosePicture picture_of(std::size_t k, const ViewOptions& o, BlockDisplay& display) {
+    const PagePicture drawn{o.width_px, o.height_px, display.target().read_pixels()};
+    return {k, reduced(drawn, kPictureWidth_px)};
+}
+
+struct FlightLog : BlockFlightFigures {
+    std::int64_t drawn = 0, reused_blocks = 0, all_meshes_made = 0, strips_made = 0, upload_bytes = 0;
+    Series settled_triangles, settled_px;
+    std::vector<PosePicture> pictures;
     double max_bound_px = 0;
     std::string csv =
         "frame,frame_ms,select_ms,triangles,blocks,strips,reused,meshes_made,upload_bytes,tau_effective,rss_bytes\n";
@@ -76,23 +106,29 @@ struct FlightLog {
         triangles.add(static_cast<double>(frame.triangles()));
         blocks.add(static_cast<double>(frame.blocks.size()));
         strips.add(static_cast<double>(frame.strips.size()));
-        tau.add(scene.tau_px());
-        bound.add(scene.promise_px().value_or(0));
+        tau_px.add(scene.tau_px());
+        promised_px.add(scene.promise_px().value_or(0));
+        reused.add(frame.reused);
+        meshes_made.add(frame.meshes_made);
+        const std::int64_t rss = resident_bytes();
+        rss_bytes.add(static_cast<double>(rss));
         drawn += static_cast<std::int64_t>(frame.blocks.size());
-        reused += frame.reused;
-        meshes_made += frame.meshes_made;
+        reused_blocks += frame.reused;
+        all_meshes_made += frame.meshes_made;
         strips_made += frame.strips_made;
         upload_bytes += static_cast<std::int64_t>(times.uploaded_bytes);
         max_bound_px = std::max(max_bound_px, scene.promise_px().value_or(0));
         csv += fmt::format("{},{:.3f},{:.4f},{},{},{},{},{},{},{:.4f},{}\n", k, ms, frame.lod_ms, frame.triangles(),
                            frame.blocks.size(), frame.strips.size(), frame.reused, frame.meshes_made,
-                           times.uploaded_bytes, scene.tau_px(), resident_bytes());
+                           times.uploaded_bytes, scene.tau_px(), rss);
     }
 };
 
 Result<FlightLog> fly(const ViewOptions& o, const FlightPath& path, const BlockFlight& f, BlockScene& scene,
                       BlockDisplay& display) {
     FlightLog log;
+    std::vector<std::size_t> pictured;
+    if (!f.report.folder.empty()) pictured = pictured_frames(path.size());
     FrameGovernor governor({f.fps > 0 ? 1000 / f.fps : 1e9, o.tau_px, f.tau_most_px});
     for (std::size_t k = 0; k < path.size(); ++k) {
         if (interrupt_flag()) return Error{ErrorCode::interrupted, "stopped"};
@@ -105,6 +141,7 @@ Result<FlightLog> fly(const ViewOptions& o, const FlightPath& path, const BlockF
         const double ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
         log.add(k, ms, frame, times, scene);
         log.holes += scene.count_holes(*camera);
+        if (std::binary_search(pictured.begin(), pictured.end(), k)) log.pictures.push_back(picture_of(k, o, display));
         if (f.fps > 0) scene.set_tau_px(governor.next(ms));
     }
     return log;
@@ -118,7 +155,7 @@ Result<void> settle(const ViewOptions& o, const FlightPath& path, BlockScene& sc
         if (!camera) return camera.error();
         scene.forget();
         log.settled_triangles.add(static_cast<double>(scene.select(*camera).triangles()));
-        log.settled_bound.add(scene.promise_px() ? o.tau_px : 0);
+        log.settled_px.add(scene.promise_px() ? o.tau_px : 0);
     }
     return {};
 }
@@ -128,9 +165,9 @@ Json settled_report(const FlightLog& log) {
     for (std::size_t k = 0; k < log.triangles.values.size(); ++k)
         if (log.settled_triangles.values[k] > 0)
             least_share = std::min(least_share, log.triangles.values[k] / log.settled_triangles.values[k]);
-    const double settled_px = log.settled_bound.mean();
+    const double settled_px = log.settled_px.mean();
     return {{"error_integral_px", settled_px},
-            {"error_integral_ratio", settled_px > 0 ? log.bound.mean() / settled_px : 1},
+            {"error_integral_ratio", settled_px > 0 ? log.promised_px.mean() / settled_px : 1},
             {"triangles", log.settled_triangles.mean_max()},
             {"least_triangle_share", least_share}};
 }
@@ -142,8 +179,8 @@ Json flight_report(const FlightLog& log, const BlockScene& scene, const ViewOpti
                    {"triangles", log.triangles.mean_max()},
                    {"blocks", log.blocks.mean_max()},
                    {"strips", log.strips.mean_max()},
-                   {"reused_share", share(log.reused, log.drawn)},
-                   {"meshes_made", log.meshes_made},
+                   {"reused_share", share(log.reused_blocks, log.drawn)},
+                   {"meshes_made", log.all_meshes_made},
                    {"strips_made", log.strips_made},
                    {"upload_bytes", log.upload_bytes},
                    {"budget_bytes", o.budget_bytes},
@@ -152,7 +189,7 @@ Json flight_report(const FlightLog& log, const BlockScene& scene, const ViewOpti
                    {"holes", log.holes}};
     if (scene.promise_px()) report["max_bound_px"] = log.max_bound_px;
     if (!log.settled_triangles.values.empty()) report["settled"] = settled_report(log);
-    report["tau_effective_px"] = log.tau.mean_max();
+    report["tau_effective_px"] = log.tau_px.mean_max();
     report["tau_px"] = o.tau_px;
     report["size_px"] = {o.width_px, o.height_px};
     report["renderer"] = renderer;
@@ -168,11 +205,13 @@ void print_flight(const FlightLog& log, const BlockScene& scene, const ViewOptio
         log.frame_ms.values.size(), renderer, log.frame_ms.quantile(0.5), log.frame_ms.quantile(0.99),
         log.select_ms.quantile(0.5), log.triangles.mean(), log.blocks.mean(), log.strips.mean(),
         promise_text(scene.promise_px() ? std::optional(log.max_bound_px) : std::nullopt),
-        100 * share(log.reused, log.drawn), log.holes, static_cast<double>(scene.resident_bytes()) / 1e6,
+        100 * share(log.reused_blocks, log.drawn), log.holes, static_cast<double>(scene.resident_bytes()) / 1e6,
         static_cast<double>(o.budget_bytes) / 1e6, dropped_text(scene.world()));
 }
 
 struct BlockAudit {
+    bool by_frame = false;  ///< fill `figures`
+    BlockAuditFigures figures;
     BlockTruth truth;
     CrackReport cracks;
     std::int64_t holes = 0, blocks = 0, reused = 0;
@@ -187,11 +226,26 @@ struct BlockAudit {
         cracks.edges += found.edges;
         cracks.open_edges += found.open_edges;
         cracks.t_junctions += found.t_junctions;
-        holes += scene.count_holes(camera);
+        const std::int64_t missing = scene.count_holes(camera);
+        holes += missing;
+        if (by_frame) note_frame(scene, camera, frame, found, missing);
         blocks += static_cast<std::int64_t>(frame.blocks.size());
         reused += frame.reused;
         worst_share = max_px() / limit_px;  // one limit for all frames
         ++frames;
+    }
+    void note_frame(const BlockScene& scene, const Camera& camera, const BlockFrame& frame, const CrackReport& found,
+                    std::int64_t missing) {
+        BlockTruth own;
+        judge_frame(scene.world(), camera, frame, 0, own);
+        figures.triangles.add(static_cast<double>(frame.triangles()));
+        figures.samples.add(static_cast<double>(own.blocks.count() + own.dikes.count()));
+        figures.blocks_max_px.add(own.blocks.max_px());
+        figures.strips_max_px.add(own.dikes.max_px());
+        figures.mean_px.add(own.blocks.mean_px());
+        figures.open_edges.add(static_cast<double>(found.open_edges));
+        figures.t_junctions.add(static_cast<double>(found.t_junctions));
+        figures.holes.add(static_cast<double>(missing));
     }
     double max_px() const { return std::max(truth.blocks.max_px(), truth.dikes.max_px()); }
     bool kept() const { return worst_share <= 1 && cracks.open_edges == 0 && cracks.t_junctions == 0 && holes == 0; }
@@ -239,6 +293,47 @@ void print_audit(const BlockAudit& a, const BlockScene& scene) {
                : a.kept()  ? ": the promise holds"
                            : ": THE PROMISE IS BROKEN",
                dropped_text(scene.world()));
+}
+
+Result<std::vector<PosePicture>> draw_poses(BlockScene& scene, const ViewOptions& o, const FlightPath& path) {
+    auto display = BlockDisplay::create(scene, display_options(o));
+    if (!display) return display.error();
+    set_look(o, (*display)->frame_settings());
+    std::vector<PosePicture> pictures;
+    for (const std::size_t k : pictured_frames(path.size())) {
+        auto camera = camera_of(path[k], o);
+        if (!camera) return camera.error();
+        scene.select(*camera);
+        (*display)->draw(*camera);
+        pictures.push_back(picture_of(k, o, **display));
+    }
+    return pictures;
+}
+
+Result<void> write_flight(const BlockReport& report, const FlightLog& log, const BlockFacts& facts, const Json& json) {
+    auto page = block_flight_page(log, facts, log.pictures);
+    if (!page) return page.error();
+    auto folder = ReportFolder::prepare(report.folder, kFlightReport, report.force);
+    if (!folder) return folder.error();
+    return folder->write({{"index.html", *page}, {"flight.csv", log.csv}, {"flight.json", json.dump(2) + "\n"}});
+}
+
+// Without pictures where they cannot be had: the figures stand by themselves.
+Result<void> write_audit(const BlockReport& report, BlockAuditFigures figures, BlockScene& scene, const ViewOptions& o,
+                         const FlightPath& path, const Json& json) {
+    auto pictures = draw_poses(scene, o, path);
+    std::string why_none;
+    if (!pictures) {
+        if (pictures.error().code != ErrorCode::display) return pictures.error();
+        why_none = pictures.error().message;
+        note("--report without pictures: {}\n", why_none);
+    }
+    auto page = block_audit_page(figures, facts_of(scene, o, report), pictures ? *pictures : std::vector<PosePicture>{},
+                                 why_none);
+    if (!page) return page.error();
+    auto folder = ReportFolder::prepare(report.folder, kAuditReport, report.force);
+    if (!folder) return folder.error();
+    return folder->write({{"index.html", *page}, {"audit.json", json.dump(2) + "\n"}});
 }
 
 }  // namespace
@@ -295,24 +390,37 @@ Result<void> fly_blocks(const ViewOptions& o, const TileStore& store, const Flig
         if (auto ok = write_png(f.last_frame, o.width_px, o.height_px, (*display)->target().read_pixels()); !ok)
             return ok;
     const std::string renderer = (*display)->context().renderer();
+    const Json report = flight_report(*log, **scene, o, renderer);
+    if (!f.report.folder.empty()) {
+        BlockFacts facts = facts_of(**scene, o, f.report);
+        facts.renderer = renderer;
+        facts.fps = f.fps;
+        if (auto ok = write_flight(f.report, *log, facts, report); !ok) return ok;
+    }
     if (o.json != "-") print_flight(*log, **scene, o, renderer);
-    return o.json.empty() ? Result<void>{}
-                          : write_text(o.json, flight_report(*log, **scene, o, renderer).dump(2) + "\n");
+    return o.json.empty() ? Result<void>{} : write_text(o.json, report.dump(2) + "\n");
 }
 
-Result<bool> audit_blocks(const ViewOptions& o, const TileStore& store, const FlightPath& path) {
+Result<bool> audit_blocks(const ViewOptions& o, const TileStore& store, const FlightPath& path,
+                          const BlockReport& report) {
     auto scene = BlockScene::open(store, scene_options(o));
     if (!scene) return scene.error();
     BlockAudit audit;
+    audit.by_frame = !report.folder.empty();
     for (const FlightPose& pose : path) {
         if (interrupt_flag()) return Error{ErrorCode::interrupted, "stopped"};
         auto camera = camera_of(pose, o);
         if (!camera) return camera.error();
         audit.look(**scene, *camera);
     }
+    const Json found = audit_report(audit, **scene);
+    if (!report.folder.empty()) {
+        audit.figures.kept = audit.kept();
+        if (auto ok = write_audit(report, audit.figures, **scene, o, path, found); !ok) return ok.error();
+    }
     if (o.json != "-") print_audit(audit, **scene);
     if (!o.json.empty())
-        if (auto ok = write_text(o.json, audit_report(audit, **scene).dump(2) + "\n"); !ok) return ok.error();
+        if (auto ok = write_text(o.json, found.dump(2) + "\n"); !ok) return ok.error();
     return !(*scene)->promise_px() || audit.kept();
 }
 

@@ -24,16 +24,25 @@ struct BlockShot {
 };
 Result<void> shoot_blocks(const ViewOptions& options, const TileStore& store, const BlockShot& shot);
 
+/// A folder with a page, that prepare() of ReportFolder has found good.
+struct BlockReport {
+    std::string folder;  ///< empty: none
+    bool force = false;
+    std::string command;  ///< as it was typed
+};
+
 struct BlockFlight {
     bool headless = false;
     double fps = 0, tau_most_px = 16;  ///< 0: tau is kept
     bool settled = false;              ///< afterwards the same poses anew, at the tolerance asked for
     std::string csv, last_frame;       ///< files; empty: none
+    BlockReport report;
 };
 Result<void> fly_blocks(const ViewOptions& options, const TileStore& store, const FlightPath& path,
                         const BlockFlight& flight);
 
 /// Was every promise kept? Nothing is judged where none is made.
-Result<bool> audit_blocks(const ViewOptions& options, const TileStore& store, const FlightPath& path);
+Result<bool> audit_blocks(const ViewOptions& options, const TileStore& store, const FlightPath& path,
+                          const BlockReport& report);
 
 }  // namespace scree

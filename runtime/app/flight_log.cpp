@@ -76,6 +76,7 @@ nlohmann::ordered_json flight_json(const FlightLog& log, const FlightFacts& fact
         {"frames_with_stand_ins", log.total(&FlightFrame::incomplete)},
         {"selections_reused", log.total(&FlightFrame::reused)},
         {"lod", facts.lod},
+        {"exaggeration", facts.exaggeration},
         {"guaranteed", facts.guaranteed},
         {"tiles_reused_share", log.tiles_reused.mean()},
         {"budget_limited_frames", log.total(&FlightFrame::limited)},

@@ -76,7 +76,7 @@ struct FlightFacts {
     double tau_px = 1, texture_tau_px = 1, fov_deg = 40;
     int width_px = 0, height_px = 0;
     std::int64_t budget_bytes = 0, peak_resident_bytes = 0, peak_rss_bytes = 0, store_updates = 0;
-    double height_quantum_error_m = 0;
+    double height_quantum_error_m = 0, exaggeration = 1;
     PagerCounters paging;
     std::array<LoaderCounters, 2> loads;  ///< by TileKind
 };

@@ -114,6 +114,7 @@ std::string settings_table(const FlightFacts& f) {
               f.guaranteed ? "its error is promised" : "its error is not promised beforehand"},
              {"picture", fmt::format("{} x {}, {:g} degrees", f.width_px, f.height_px, f.fov_deg),
               "size in pixels, vertical field of view"},
+             {"heights", fmt::format("x {:g}", f.exaggeration), "as drawn; errors count in these"},
              {"rounding of heights", fmt::format("{:.3g} m at most", f.height_quantum_error_m),
               "when the store was built; comes on top of every error here"},
              {"renderer", escaped(f.renderer), "as OpenGL names it"},

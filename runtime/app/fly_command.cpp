@@ -249,6 +249,7 @@ FlightFacts facts_of(const Scene& scene, const ViewOptions& o, const FlyOptions&
     facts.peak_resident_bytes = scene.peak_resident_bytes();
     facts.peak_rss_bytes = process_usage().peak_rss_bytes;
     facts.store_updates = scene.updates();
+    facts.exaggeration = scene.dataset().exaggeration;
     facts.height_quantum_error_m = scene.dataset().height_quantum_error_m;
     facts.paging = scene.counters();
     for (const TileKind kind : {TileKind::height, TileKind::texture})
@@ -257,7 +258,7 @@ FlightFacts facts_of(const Scene& scene, const ViewOptions& o, const FlyOptions&
 }
 
 Result<ReportFolder> report_folder(const FlyOptions& f) {
-    return ReportFolder::prepare(f.report, {"index.html", "flight.csv", "flight.json"}, f.force);
+    return ReportFolder::prepare(f.report, kFlightReport, f.force);
 }
 
 Result<void> write_report(const FlightLog& log, const FlightFacts& facts, const std::vector<PosePicture>& pictures,
@@ -281,12 +282,13 @@ Result<FlightPath> path_of(const TileStore& store, const ViewOptions& o, const F
 
 Result<void> run_blocks(const ViewOptions& o, const FlyOptions& f, const TileStore& store) {
     for (const auto& [given, option] :
-         {std::pair(f.see_through, "--see-through"), std::pair(f.latency_ms > 0, "--latency"),
-          std::pair(!f.report.empty(), "--report")})
+         {std::pair(f.see_through, "--see-through"), std::pair(f.latency_ms > 0, "--latency")})
         if (auto ok = refuse_with_blocks(given, option); !ok) return ok;
     auto path = path_of(store, o, f);
     if (!path) return path.error();
-    return fly_blocks(o, store, *path, {f.headless, f.fps, f.tau_most_px, f.settled, f.csv, f.last_frame});
+    return fly_blocks(
+        o, store, *path,
+        {f.headless, f.fps, f.tau_most_px, f.settled, f.csv, f.last_frame, {f.report, f.force, f.command}});
 }
 
 Result<void> run(const ViewOptions& o, const FlyOptions& f) {

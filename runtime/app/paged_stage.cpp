@@ -108,9 +108,26 @@ std::vector<LineSegment> PagedStage::boxes() const {
     return lines;
 }
 
+namespace {
+
+// A tile counts in each view that it is drawn in, as its triangles do, and once where it is drawn in parts.
+std::size_t tiles_drawn(const Selection& s) {
+    if (s.draws.size() == 1) return static_cast<std::size_t>(s.nodes);
+    std::size_t tiles = 0;
+    for (const DrawList& view : s.draws) {
+        std::set<TileId> ids;
+        for (const DrawItem& item : view) ids.insert(item.tile);
+        tiles += ids.size();
+    }
+    return tiles;
+}
+
+}  // namespace
+
 void PagedStage::describe(HudModel& model) const {
     const Selection& s = *frame_.selection;
-    model.picture.push_back({"drawn", fmt::format("{} triangles in {} tiles", grouped(s.triangles), s.nodes)});
+    model.picture.push_back({"drawn", fmt::format("{} triangles in {} tiles{}", grouped(s.triangles), tiles_drawn(s),
+                                                  s.draws.size() > 1 ? ", both views" : "")});
     describe_error(model);
     std::string method(to_string(scene_->options().lod.method));
     if (scene_->mesher() != nullptr)

@@ -9,6 +9,7 @@
 
 #include <glm/glm.hpp>
 
+#include "common/dataset.h"
 #include "common/result.h"
 #include "runtime/render/line_renderer.h"
 #include "runtime/window/ground_probe.h"
@@ -24,8 +25,9 @@ struct ProfileSummary {
 };
 /// `exaggeration`: of the profile's heights.
 ProfileSummary summary_of(const Profile& profile, double exaggeration);
-/// "along_m,x_m,y_m,height_m", a line a point; no height where there is no ground.
-std::string csv_of(const Profile& profile, double exaggeration);
+/// "along_m,x_m,y_m,height_m,longitude_deg,latitude_deg,crs", a line a point: x, y and height in the dataset's systems,
+/// the height as the ground has it. Empty where there is no ground, or the dataset does not say.
+std::string csv_of(const Profile& profile, const Dataset& dataset);
 
 class ProfileTool {
 public:

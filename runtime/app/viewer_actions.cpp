@@ -256,7 +256,7 @@ void Viewer::save_profile() {
     if (profile_.profile() == nullptr) return;
     const auto file = free_file("profile.csv", next_profile_);
     if (!file) return;
-    if (auto ok = write_text(file->string(), csv_of(*profile_.profile(), stage_.dataset().exaggeration)); !ok)
+    if (auto ok = write_text(file->string(), csv_of(*profile_.profile(), stage_.dataset())); !ok)
         return say(ok.error().message);
     profiles_.push_back(file->string());
     say(fmt::format("{} is written.", file->string()));

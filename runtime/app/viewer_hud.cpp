@@ -29,8 +29,10 @@ void Viewer::describe_place(HudModel& model) const {
     constexpr const char* kModes[] = {"flying", "circling", "walking"};
     const Dataset& d = stage_.dataset();
     const glm::dvec3 eye = rig_.pose().eye;
-    model.place.push_back({"mode", fmt::format("{}, {}", kModes[static_cast<std::size_t>(rig_.mode())],
-                                               speed_text(rig_.speed_m_per_s()))});
+    const auto away_m = rig_.orbit_distance_m();
+    model.place.push_back(
+        {"mode", fmt::format("{}, {}", kModes[static_cast<std::size_t>(rig_.mode())],
+                             away_m ? length_text(*away_m) + " away" : speed_text(rig_.speed_m_per_s()))});
     model.place.push_back({"eye", place_text(eye, d)});
     if (const auto at = lon_lat_text(eye, d)) model.place.push_back({"", *at});
     model.place.push_back(

@@ -14,6 +14,10 @@ struct ReportFile {
     std::string text;
 };
 
+/// What the reports of a flight and of an audit consist of.
+inline const std::vector<std::string> kFlightReport{"index.html", "flight.csv", "flight.json"};
+inline const std::vector<std::string> kAuditReport{"index.html", "audit.json"};
+
 class ReportFolder {
 public:
     /// `files`: what a report of this kind is made of; nothing else is ever removed. `force`: an earlier report is

@@ -103,7 +103,7 @@ bool CameraRig::take(const FlightPose& pose) {
 void CameraRig::set_pose(const FlightPose& pose) {
     if (!take(pose)) return;
     target_ = eye_ + distance_m_ * forward();
-    if (mode_ == RigMode::walk) descent_ = Descent{eye_.z, 0};
+    if (mode_ == RigMode::walk) descent_ = Descent{eye_.z, 0, {}};
 }
 
 void CameraRig::go_home() {
@@ -119,7 +119,7 @@ void CameraRig::set_mode(RigMode mode, const std::optional<glm::dvec3>& middle) 
     mode_ = mode;
     descent_.reset();
     settling_ = false;
-    if (mode == RigMode::walk) descent_ = Descent{eye_.z, 0};
+    if (mode == RigMode::walk) descent_ = Descent{eye_.z, 0, pitch_ < 0 ? std::optional(pitch_) : std::nullopt};
     if (mode != RigMode::orbit || glide_) return;
     const glm::dvec3 centre = centre_of_orbit(middle);
     glide_ = Glide{eye_, eye_, centre, heading_, pitch_, 0, kTurnToCentre_s};
@@ -130,6 +130,7 @@ void CameraRig::focus(const glm::dvec3& point) {
     if (!usable(point)) return;
     const double distance = glm::length(point - eye_);
     if (!(distance > kNearest_m)) return;
+    if (descent_) descent_->pitch.reset();
     focus_ = point;
     distance_m_ = distance;
     const double nearer = std::max(distance / 2, kNearest_m);
@@ -201,7 +202,9 @@ void CameraRig::fly(const RigInput& in) {
 }
 
 void CameraRig::walk(const RigInput& in) {
+    const double tilted = pitch_;
     turn(in);
+    if (descent_ && pitch_ != tilted) descent_->pitch.reset();
     glm::dvec3 step = in.ahead * glm::dvec3(std::cos(heading_), std::sin(heading_), 0) + in.right * right();
     if (const double length = glm::length(step); length > 1) step /= length;
     eye_ = within_reach(eye_, eye_ + step * (walk_speed_ * pace(in)));
@@ -241,6 +244,7 @@ void CameraRig::follow_ground(double seconds, double least_m) {
         descent_->seconds += seconds;
         const double s = eased(descent_->seconds / kDescent_s);
         eye_.z = std::max(least_m, descent_->from_m + (least_m - descent_->from_m) * s);
+        if (descent_->pitch) pitch_ = *descent_->pitch * (1 - s);
         if (descent_->seconds >= kDescent_s) {
             descent_.reset();
             eye_.z = least_m;

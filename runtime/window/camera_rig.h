@@ -42,7 +42,8 @@ public:
     RigMode mode() const { return mode_; }
     /// The picture stays as it is at first. To orbit: round what was focused on last, or what the view's middle is said
     /// to show (`middle`), whichever is first in view, or a point ahead; the view turns to it within half a second. To
-    /// walk: the eye comes down (or up) to the ground within 1.5 s, as soon as its height is known.
+    /// walk: the eye comes down (or up) to the ground within 1.5 s, as soon as its height is known, and a view that
+    /// goes down is levelled meanwhile, unless it is tilted by hand.
     void set_mode(RigMode mode, const std::optional<glm::dvec3>& middle = {});
     /// Glides to where the point is in the middle of the view and nearer by half, within a second; orbits it from then
     /// on where the mode is orbit; turns to it where it stands in walk. Any wish to move ends the glide. What is no
@@ -77,6 +78,7 @@ private:
     };
     struct Descent {
         double from_m = 0, seconds = 0;
+        std::optional<double> pitch{};  ///< that it began with, to be levelled; none: not below level, or tilted since
     };
     struct Place {
         glm::dvec3 eye{0};

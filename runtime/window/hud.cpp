@@ -90,7 +90,7 @@ HudAnswer Hud::draw(const HudModel& model) {
     } else {
         draw_credit(model);
     }
-    if (model.show_status) {
+    if (model.show_status && !model.show_help) {  // which would lie over it
         draw_status(model);
         draw_legend(model);
     }

@@ -91,7 +91,7 @@ void key_line(std::string_view name, std::string_view does, bool greyed, float w
     if (greyed) ImGui::PopStyleColor();
 }
 
-// Lines of the list of keys, headings included, for an even split into columns.
+// Lines of the list of keys, headings included.
 struct HelpLine {
     std::string_view heading, name, does;
     bool greyed = false;
@@ -108,6 +108,15 @@ std::vector<HelpLine> help_lines(const HudModel& model) {
         lines.push_back({{}, key.name, key.does, refusal_of(model, key.action) != nullptr});
     }
     return lines;
+}
+
+// Where the second column begins: the heading that is nearest the middle.
+std::size_t second_column(const std::vector<HelpLine>& lines) {
+    std::size_t best = lines.size();
+    const auto off = [&](std::size_t k) { return k > lines.size() / 2 ? k - lines.size() / 2 : lines.size() / 2 - k; };
+    for (std::size_t k = 0; k < lines.size(); ++k)
+        if (!lines[k].heading.empty() && off(k) < off(best)) best = k;
+    return best;
 }
 
 void help_column(std::span<const HelpLine> lines, float width) {
@@ -208,7 +217,7 @@ DrawnPanel draw_help(const HudModel& model) {
     if (ImGui::Begin("keys", nullptr, kPanel)) {
         const std::vector<HelpLine> lines = help_lines(model);
         const std::span<const HelpLine> all(lines);
-        const std::size_t half = (lines.size() + 1) / 2;
+        const std::size_t half = second_column(lines);
         const float width = std::min((size.x - 8 * margin()) / 2, kMostHelp_em * em());
         help_column(all.first(half), width);
         ImGui::SameLine(0, 2 * margin());

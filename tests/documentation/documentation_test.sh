@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Manual pages and completion say what --help says; docs name every format that is read.
-#     documentation_test.sh BUILD PART        PART: man_pages, completion or formats
+#     documentation_test.sh BUILD PART        PART: man_pages, completion (of bash), zsh, fish or formats
 set -euo pipefail
 
 build=$1 part=$2
@@ -96,6 +96,58 @@ completion() {
     expect "" scree nosuch ''
     expect "audit" scree-view au
     expect "alps two.scree alps.d alps.scree" scree-view al
+    expect "auto" scree-view shot --curvature au
+    expect "--tau --tau-max" scree-view fly --tau
+    expect "--fov --fps" scree-view alps.scree --f
+}
+
+# What zsh would offer, of which it takes what begins as the last word does.
+zsh_words() {
+    zsh -f -c 'compadd() { shift; print -l -- "$@"; }
+        _files() { print -r -- "files $*"; }
+        complete_it() { local -a words=("${@:2}"); local CURRENT=${#words}; source "$1"; }
+        complete_it "$@"' zsh "$pages/_$1" "$@" | { grep -E -- "^(${*: -1}|files)" || true; } | LC_ALL=C sort | xargs
+}
+
+zsh() {
+    [[ -n $(type -P zsh) ]] || { printf 'needs zsh\n' && exit 77; }
+    zsh() { command zsh "$@"; }
+    words() { zsh_words "$@"; }
+    [[ $(head -n 1 "$pages/_scree-view") == "#compdef scree-view" ]] || fail "zsh does not know whose completion it is"
+    expect "samples synth" scree s
+    expect "--imagery --imagery-nodata" scree build --im
+    expect "bilinear" scree build dem.tif --resampling b
+    expect "none smooth" scree build --fill ''
+    expect "" scree build --threads ''
+    expect "files" scree build al
+    expect "files -g *.scree" scree info al
+    expect "--heights --help" scree export --he
+    expect "" scree nosuch ''
+    expect "audit files -g *.scree" scree-view au
+    expect "auto" scree-view shot --curvature au
+    expect "--fov --fps" scree-view alps.scree --f
+}
+
+fish_words() {
+    fish --no-config -c 'source $argv[1]; complete -C $argv[2]' "$pages/$1.fish" "$*" | cut -f 1 | LC_ALL=C sort | xargs
+}
+
+fish() {
+    [[ -n $(type -P fish) ]] || { printf 'needs fish\n' && exit 77; }
+    fish() { command fish "$@"; }
+    words() { fish_words "$@"; }
+    folder=$(mktemp -d) # not local: the trap wants it
+    trap 'rm -rf -- "$folder"' EXIT
+    cd -- "$folder"
+    touch alps.scree 'alps two.scree' alps.tif
+    expect "samples synth" scree s
+    expect "--imagery --imagery-nodata" scree build --im
+    expect "bilinear" scree build dem.tif --resampling b
+    expect "none smooth" scree build --fill ''
+    expect "" scree build --threads ''
+    expect "alps two.scree alps.scree alps.tif" scree build al
+    expect "--heights --help" scree export --he
+    expect "audit" scree-view au
     expect "auto" scree-view shot --curvature au
     expect "--tau --tau-max" scree-view fly --tau
     expect "--fov --fps" scree-view alps.scree --f

@@ -36,8 +36,10 @@ holds() {
 field() { dpkg-deb -f "$out/$1"_*.deb "$2"; }
 
 holds scree usr/bin/scree usr/libexec/scree/scree-decoder usr/libexec/scree/scree-decoder-openimageio \
-    usr/share/man/man1/scree.1.gz usr/share/man/man1/scree-build.1.gz usr/share/bash-completion/completions/scree
-holds scree-view usr/bin/scree-view usr/share/man/man1/scree-view-fly.1.gz usr/share/bash-completion/completions/scree-view
+    usr/share/man/man1/scree.1.gz usr/share/man/man1/scree-build.1.gz usr/share/bash-completion/completions/scree \
+    usr/share/zsh/vendor-completions/_scree usr/share/fish/vendor_completions.d/scree.fish
+holds scree-view usr/bin/scree-view usr/share/man/man1/scree-view-fly.1.gz usr/share/bash-completion/completions/scree-view \
+    usr/share/zsh/vendor-completions/_scree-view usr/share/fish/vendor_completions.d/scree-view.fish
 holds libscree-dev usr/include/scree/scree.h usr/include/scree/runtime/scene/scene.h 'usr/lib/.*libscree_gl.a' \
     'usr/lib/.*cmake/scree/screeConfig.cmake' 'usr/lib/.*pkgconfig/scree.pc'
 [[ $(find "$out" -maxdepth 1 -name '*.deb' | wc -l) == 3 ]] || fail "not three packages: $(ls "$out")"

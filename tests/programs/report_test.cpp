@@ -113,12 +113,41 @@ TEST_F(Reporting, NothingButAnEarlierReportIsReplaced) {
     EXPECT_EQ(audit("twice", {"--force"}).exit_code, 0);
     expect_only(land_->file("twice"), {"index.html", "audit.json"});
     EXPECT_EQ(scree_view({"audit", store(), "--force"}).exit_code, kUsage) << "--force of nothing";
-    for (const auto& run :
-         {fly("blocks", {"--lod", "rsg", "--cracks", "dike"}), audit("blocks", {"--lod", "rsg", "--cracks", "dike"})}) {
-        EXPECT_EQ(run.exit_code, kUsage) << describe(run);
-        EXPECT_NE(run.err.find("--report"), std::string::npos) << run.err;
-    }
-    EXPECT_FALSE(std::filesystem::exists(land_->file("blocks")));
+}
+
+TEST_F(Reporting, BlocksAreReportedWithoutWhatOnlyTilesHave) {
+    const std::vector<std::string> blocks{"--lod", "rsg", "--cracks", "dike", "--exaggeration", "2", "--json", "-"};
+    const auto audited = report_of(audit("blocks audit", blocks));
+    expect_only(land_->file("blocks audit"), {"index.html", "audit.json"});
+    EXPECT_EQ(nlohmann::json::parse(text_of(land_->file("blocks audit/audit.json"))), audited);
+    EXPECT_EQ(audited["exaggeration"], 2);
+    std::string page = page_of("blocks audit");
+    expect_well_formed(page);
+    expect_self_contained(page);
+    EXPECT_NE(page.find("The promise holds."), std::string::npos);
+    EXPECT_EQ(count(page, "src=\"data:image/png;base64,"), land_->can_draw() ? 4u : 0u);
+    EXPECT_NE(page.find("strips max, px"), std::string::npos);
+    EXPECT_EQ(audit("blocks audit", blocks).exit_code, kUsage) << "without --force";
+    if (!land_->can_draw()) GTEST_SKIP() << "the rest needs OpenGL 4.5 by surfaceless EGL";
+
+    const auto flown = report_of(fly("blocks", blocks));
+    expect_only(land_->file("blocks"), {"index.html", "flight.csv", "flight.json"});
+    EXPECT_EQ(nlohmann::json::parse(text_of(land_->file("blocks/flight.json"))), flown);
+    EXPECT_EQ(flown["exaggeration"], 2);
+    page = page_of("blocks");
+    expect_well_formed(page);
+    expect_self_contained(page);
+    EXPECT_EQ(count(page, "src=\"data:image/png;base64,"), 8u);
+    EXPECT_NE(page.find("12 frames, median "), std::string::npos);
+    EXPECT_NE(page.find("Blocks kept and made"), std::string::npos);
+    for (const char* of_tiles : {"texture", "stand-in", "tiles"})
+        EXPECT_EQ(page.find(of_tiles), std::string::npos) << of_tiles;
+    std::istringstream csv(text_of(land_->file("blocks/flight.csv")));
+    std::string line;
+    std::getline(csv, line);
+    for (const char* column : {"queue", "stand_ins", "resident_textures_bytes", "uploads"})
+        EXPECT_EQ(line.find(column), std::string::npos) << column;
+    EXPECT_EQ(fly("blocks", blocks).exit_code, kUsage) << "without --force";
 }
 
 TEST_F(Reporting, ABrowserShowsThePagesWithoutAComplaint) {

@@ -53,17 +53,16 @@ void print_man_page() {
     fmt::print("{}", scree::man_page(page));
 }
 
-void print_completion() {
-    std::vector<std::string> words;
-    for (const Command& c : kCommands) words.emplace_back(c.name);
-    words.insert(words.end(), {"--help", "--version"});
-    fmt::print("{}", scree::completion_head("scree", words, false));
+void print_completion(scree::Shell shell) {
+    scree::CompletedProgram program{"scree", {}, {"--help", "--version"}, false};
+    for (const Command& c : kCommands) program.commands.emplace_back(c.name, c.summary);
+    fmt::print("{}", scree::completion_head(program, shell));
     for (const Command& c : kCommands) {
-        std::string title = fmt::format("scree {}", c.name), flag = "--completion-case";
+        std::string title = fmt::format("scree {}", c.name), flag = scree::completion_flag(shell);
         std::array<char*, 3> arguments{title.data(), flag.data(), nullptr};
         c.run(2, arguments.data());
     }
-    fmt::print("{}", scree::completion_tail("scree"));
+    fmt::print("{}", scree::completion_tail(program, shell));
 }
 
 }  // namespace
@@ -74,7 +73,7 @@ int main(int argc, char** argv) {
     if (name == "--help" || name == "-h") return print_help(), 0;
     if (name == "--version") return fmt::print("scree {}\n", SCREE_VERSION), 0;
     if (name == "--man-page") return print_man_page(), 0;
-    if (name == "--completion") return print_completion(), 0;
+    if (const auto shell = scree::completion_asked(name)) return print_completion(*shell), 0;
     for (const Command& c : kCommands) {
         if (c.name != name) continue;
         std::string title = "scree " + std::string(name);

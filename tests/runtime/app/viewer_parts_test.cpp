@@ -89,9 +89,19 @@ TEST(ProfileTool, SumsUpWhatTheGroundHasAndNotWhatIsDrawn) {
 }
 
 TEST(ProfileTool, WritesALineAPointAndNoHeightWhereThereIsNoGround) {
-    EXPECT_EQ(csv_of(some_profile(), 2),
-              "along_m,x_m,y_m,height_m\n0.000,0.000,0.000,10.000\n125.000,100.000,75.000,20.000\n"
-              "250.000,200.000,150.000,\n375.000,300.000,225.000,5.000\n500.000,400.000,300.000,15.000\n");
+    Dataset dataset;
+    dataset.exaggeration = 2;
+    EXPECT_EQ(csv_of(some_profile(), dataset),
+              "along_m,x_m,y_m,height_m,longitude_deg,latitude_deg,crs\n0.000,0.000,0.000,10.000,,,\n"
+              "125.000,100.000,75.000,20.000,,,\n250.000,200.000,150.000,,,,\n375.000,300.000,225.000,5.000,,,\n"
+              "500.000,400.000,300.000,15.000,,,\n");
+    dataset.crs = "EPSG:32651";
+    dataset.geo_grid = GeoGrid{2, 2, {0, 0, 1000, 1000}, {}, 0};
+    for (const double latitude : {30.0, 60.0})
+        for (int k = 0; k < 2; ++k) dataset.geo_grid->normals.push_back(normal_of({90, latitude}));
+    EXPECT_NE(csv_of(some_profile(), dataset).find("0.000,0.000,0.000,10.000,90.0000000,60.0000000,EPSG:32651\n"),
+              std::string::npos)
+        << csv_of(some_profile(), dataset);
 }
 
 TEST(ProfileTool, TakesTheAnswerToItsOwnQuestionOnly) {

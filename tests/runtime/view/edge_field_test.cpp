@@ -169,7 +169,10 @@ TextureTile texture_with(int size_log2, const Has& has) {
                     const int x = std::min(4 * bx + k % 4, size - 1), y = std::min(4 * by + k / 4, size - 1);
                     if (!has(((2 * x + 1) << mip) / 2, ((2 * y + 1) << mip) / 2)) selectors |= 3u << (2 * k);
                 }
-                for (const unsigned endpoint : {0x1111u, 0x2222u})
+                // Four colours, the last of which is opaque, where nothing is absent.
+                const bool whole = selectors == 0;
+                if (whole) selectors = 0xffffffffu;
+                for (const unsigned endpoint : {whole ? 0x2222u : 0x1111u, whole ? 0x1111u : 0x2222u})
                     for (const unsigned shift : {0u, 8u})
                         tile.blocks.push_back(static_cast<std::uint8_t>(endpoint >> shift));
                 for (const unsigned shift : {0u, 8u, 16u, 24u})
@@ -192,7 +195,7 @@ TEST(EdgeField, ReadsWhatHasGroundOfTheTexturesThereAre) {
     for (int level = 0; level <= 3; ++level)
         for (std::int64_t y = 0; y < l.tiles_y(level); ++y)
             for (std::int64_t x = 0; x < l.tiles_x(level); ++x) {
-                if (level == 3 && x < l.tiles_x(level) / 4) continue;  // all ground: the textures end above
+                if (level == 3 && x == 6) continue;  // the textures end above
                 const double texel = std::ldexp(64.0, -level - 4);
                 store.tiles[{level, x, y}] = texture_with(4, [&](int i, int j) {
                     return has_ground((static_cast<double>(16 * x + i) + 0.5) * texel,
