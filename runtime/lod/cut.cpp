@@ -262,6 +262,7 @@ std::int32_t Cut::add_twin(std::int32_t twin, std::int32_t parent) {
     node.floor = level_of(minimum_exponent(node));
     node.neighbours = node.children = {-1, -1, -1, -1};
     node.grows_from_s = -kInfinity;
+    node.released = kOneLevel;
     node.priority = 0;
     return enter(parent);
 }
@@ -443,7 +444,7 @@ bool Cut::try_split(std::int32_t index) {
 // A page that came late starts from its parent's finest shape: the youngest of the visible children sets the pace. What
 // came while its parent was still growing waits for that, so that no level is taken in less than its time.
 void Cut::grow(std::int32_t index) {
-    const CutNode& parent = nodes_[static_cast<std::size_t>(index)];
+    CutNode& parent = nodes_[static_cast<std::size_t>(index)];
     const Level parents_finest = level_of(minimum_exponent(parent));
     // The nearer it is to where nobody could follow it with his eyes, the quicker.
     const double parallax_px = settings_.moved_m / parent.texel_per_px;
@@ -455,16 +456,19 @@ void Cut::grow(std::int32_t index) {
         if (node.visible() && node.slot >= 0)
             from_s = std::max(from_s, residency_->heights.arrived_s[static_cast<std::size_t>(node.slot)]);
     }
-    const double share = growth_s > 0 ? (residency_->now_s - from_s) / growth_s : 1;
-    Level floor = std::numeric_limits<Level>::min();
-    if (share < 1) floor = parents_finest - level_of_share(std::max(share, 0.0));
+    for (const std::int32_t child : parent.children)
+        if (child >= 0) nodes_[static_cast<std::size_t>(child)].grows_from_s = from_s;
+    const double levels = growth_s > 0 ? std::max((residency_->now_s - from_s) / growth_s, 0.0) : kInfinity;
+    if (!(levels < 1)) return;
+    parent.released = level_of_share(levels);
+    growing_ = growing_ || parent.approach > 0;
+    Level floor = parents_finest - level_of_share(levels);
     if (parent.floor > parents_finest) floor = std::max(floor, parent.floor);
     for (const std::int32_t child : parent.children) {
         if (child < 0) continue;
         CutNode& node = nodes_[static_cast<std::size_t>(child)];
-        node.grows_from_s = from_s;
         node.floor = std::max(node.floor, floor);
-        if (!node.visible() || node.level >= node.floor) continue;
+        if (node.level >= node.floor) continue;
         // Neighbours keep to what is drawn, not to what it will be.
         node.level = node.floor;
         needs_floors_ = growing_ = true;
@@ -536,10 +540,11 @@ Level Cut::allowance(const CutNode& node, const CutNode& beside) const {
     return std::max({-node.approach, beside.approach, Level{0}});
 }
 
-// How coarse a smaller page may be: no coarser than a leaf; less and less bound to what was one as its need has grown.
+// How coarse a smaller page may be: no coarser than a leaf; less and less bound to what was one as its need has grown,
+// and as what came late to take its place has.
 Level Cut::limit_beside(const CutNode& node) const {
-    if (!node.split) return node.level;
-    return node.level + std::max(node.approach, Level{0});
+    if (!node.split || node.approach <= 0) return node.level;
+    return node.level + std::min(node.approach, node.released);
 }
 
 // How coarse an edge may be. The finest surface is only inexact where its edges move: they may move no further than its

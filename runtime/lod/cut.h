@@ -79,7 +79,8 @@ struct alignas(64) CutNode {
     double finest_error_m = 0;       ///< of its own densest mesh, thinned edges included
     double texture_need = 0;         ///< of its own texture over the tolerance, where finer textures exist
     double grows_from_s = -std::numeric_limits<double>::infinity();  ///< when it begins to leave its parent's shape
-    double priority = 0;                                             ///< need of the parent when it was split
+    Level released = kOneLevel;  ///< how far a split page whose children came late has let go of smaller neighbours
+    double priority = 0;         ///< need of the parent when it was split
 
     bool visible() const { return seen_by != 0; }
 };
@@ -112,8 +113,8 @@ class Cut {
 public:
     explicit Cut(const Dataset& dataset);
 
-    /// Makes the cut anew. False: more than max_pages would be needed; the cut is then unusable. `beside`: one just made
-    /// of the same views and residency for the same tolerances: what it has measured is not measured again.
+    /// Makes the cut anew. False: more than max_pages would be needed; the cut is then unusable. `beside`: one just
+    /// made of the same views and residency for the same tolerances: what it has measured is not measured again.
     bool refine(std::span<const LodView> views, const CutSettings& settings, const Residency& residency,
                 const Cut* beside = nullptr);
 

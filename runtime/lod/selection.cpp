@@ -171,8 +171,8 @@ struct Selector::Impl {
             }
     }
 
-    // The pages of the plan at or under which something is asked for: a tile drawn there stands in for it. What is drawn
-    // and no page of the plan has nothing to wait for.
+    // The pages of the plan at or under which something is asked for: a tile drawn there stands in for it. What is
+    // drawn and no page of the plan has nothing to wait for.
     void note_missing() {
         if (result.complete) return;
         for (std::size_t k = plan.nodes().size(); k-- > 0;)

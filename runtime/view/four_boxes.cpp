@@ -68,11 +68,12 @@ using FourBits = long long __attribute__((vector_size(32)));
     raise_to(gap_z, zero);
     raise_to(gap_z, eye.z - high);
     const Four squares = gap_x * gap_x + gap_y * gap_y + gap_z * gap_z;
-    for (std::size_t k = 0; k < 4; ++k)
-        out.distance_m[k] = std::max(std::sqrt(squares[static_cast<int>(k)]), near_m);
+    for (std::size_t k = 0; k < 4; ++k) out.distance_m[k] = std::max(std::sqrt(squares[static_cast<int>(k)]), near_m);
 }
 
-void see_sse2(const Frustum& f, const FourBoxes& b, double c, double n, bool i, FourSeen& out) { see(f, b, c, n, i, out); }
+void see_sse2(const Frustum& f, const FourBoxes& b, double c, double n, bool i, FourSeen& out) {
+    see(f, b, c, n, i, out);
+}
 
 #if defined(__x86_64__)
 [[gnu::target("avx2")]] void see_avx2(const Frustum& f, const FourBoxes& b, double c, double n, bool i, FourSeen& out) {

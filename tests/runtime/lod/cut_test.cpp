@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <tuple>
 
+#include "runtime/view/four_boxes.h"
 #include "tests/runtime/lod/selection_support.h"
 
 namespace scree {
@@ -101,6 +103,84 @@ TEST(Cut, NoLeafCanBeRaisedWithoutBreakingItsToleranceOrARule) {
     EXPECT_GT(leaves, 3000);
     EXPECT_GT(between, 500);
     EXPECT_LT(raised_to_the_top, leaves);
+}
+
+auto numbers(const CutNode& n) {
+    return std::tuple(n.id, n.split, n.level, n.floor, n.seen_by, n.slot, n.texture_slot, n.leaf, n.children, n.parent,
+                      n.metres_per_px, n.texel_per_px, n.finest_error_m, n.texture_need, n.priority, n.approach);
+}
+
+TEST(Cut, BesideAPlanItMeasuresNothingAgainAndIsTheSame) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    std::int64_t from_the_plan = 0, own = 0;
+    for (int world = 0; world < 60; ++world) {
+        const auto terrain = test::random_terrain(random, world % 4, kErrorGrowth, test::depth_of_world(world));
+        test::FakeResidency residency(terrain);
+        residency.add_roots();
+        residency.add_random(random, test::uniform(random, 20, 100));
+        SelectionSettings timing;
+        test::arrive_at_random(random, terrain, residency, timing);
+        Cut plan(terrain.dataset()), beside(terrain.dataset()), alone(terrain.dataset());
+        for (int k = 0; k < 4; ++k) {
+            std::vector<LodView> views;
+            for (int v = 0; v <= k % 3; ++v) views.emplace_back(test::random_camera(random, terrain));
+            CutSettings settings;
+            settings.tau_px = std::exp(test::uniform_real(random, 0, 6));
+            settings.texture_tau_px = std::exp(test::uniform_real(random, -2, 4));
+            settings.max_pages = 1 << 20;
+            if (k % 2 != 0) settings.half_curvature = test::random_half_curvature(random, terrain);
+            ASSERT_TRUE(plan.refine(views, settings, residency));
+            settings.only_resident = true;
+            settings.growth_s = timing.growth_s;
+            ASSERT_TRUE(beside.refine(views, settings, residency, &plan));
+            ASSERT_TRUE(alone.refine(views, settings, residency));
+            ASSERT_EQ(beside.nodes().size(), alone.nodes().size());
+            for (std::size_t n = 0; n < alone.nodes().size(); ++n) {
+                ASSERT_EQ(numbers(beside.nodes()[n]), numbers(alone.nodes()[n]));
+                ++(beside.nodes()[n].twin >= 0 ? from_the_plan : own);
+            }
+        }
+    }
+    EXPECT_GT(from_the_plan, 300);
+    EXPECT_LT(own, from_the_plan);
+}
+
+TEST(FourBoxes, AreSeenInTheSameBitsAsOneByOne) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    std::array<int, 3> met{};
+    for (int k = 0; k < 20000; ++k) {
+        const double size = std::exp(test::uniform_real(random, 0, 8));
+        const auto anywhere = [&] { return test::uniform_real(random, -size, size); };
+        const auto camera = look_at({anywhere(), anywhere(), anywhere()}, {anywhere(), anywhere(), anywhere()},
+                                    test::uniform_real(random, 5, 120), test::uniform(random, 1, 900), 600);
+        if (!camera) continue;
+        const Frustum frustum(*camera);
+        const double half_curvature = k % 2 == 0 ? 0 : std::exp(test::uniform_real(random, -14, -2));
+        const bool inside = k % 5 == 0;
+        std::array<Box, 4> boxes;
+        FourBoxes four;
+        for (std::size_t b = 0; b < 4; ++b) {
+            Box& box = boxes[b];
+            for (int axis = 0; axis < 3; ++axis) {
+                box.low[axis] = anywhere();
+                box.high[axis] = box.low[axis] + (k % 7 == 0 ? 0 : test::uniform_real(random, 0, size));
+            }
+            four.west[b] = box.low.x, four.south[b] = box.low.y, four.low[b] = box.low.z;
+            four.east[b] = box.high.x, four.north[b] = box.high.y, four.high[b] = box.high.z;
+        }
+        const FourSeen seen = see_four(frustum, four, half_curvature, camera->near_m, inside);
+        for (std::size_t b = 0; b < 4; ++b) {
+            const Box box = lowered_by_curvature(boxes[b], camera->eye, half_curvature);
+            const Sight sight = inside ? Sight::all : frustum.sight(box);
+            ++met[static_cast<std::size_t>(sight)];
+            ASSERT_EQ((seen.none >> b & 1) != 0, sight == Sight::none);
+            ASSERT_EQ((seen.all >> b & 1) != 0, sight == Sight::all);
+            ASSERT_EQ(seen.distance_m[b], std::max(distance_to_box(camera->eye, box), camera->near_m));
+        }
+    }
+    for (const int count : met) EXPECT_GT(count, 1000);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "common/store/height_codec.h"
 #include "common/store/texture_codec.h"
 #include "runtime/app/cpu_arena.h"
+#include "tests/runtime/lod/probed_surface.h"
 #include "tests/runtime/lod/synthetic_terrain.h"
 
 namespace scree {
@@ -254,6 +255,45 @@ TEST_F(SceneOfHills, AdvancingTakesNoMoreThanItsShareOfArrivals) {
         std::this_thread::sleep_for(std::chrono::microseconds(200));
     }
     EXPECT_GT(uploads, 10);
+}
+
+// How far, at most, a point of the ground moves across the screen from one frame to the next, 2 ms apart, while all
+// that one eye wants arrives from a slow disk.
+double greatest_step_px(const StoredTerrain& stored, double growth_s) {
+    SceneOptions options = small_options();
+    options.latency_ms = 10;
+    options.foresight_s = 0;
+    options.growth_s = growth_s;
+    Staged staged(stored, options);
+    const Camera camera = stored.camera(200, 512);
+    const test::ProbedSurface surface(stored.terrain(), *staged.arena);
+    std::vector<glm::dvec2> places;
+    for (int k = 0; k < 400; ++k) places.push_back({205.3 + 6.1 * (k % 20), 452.7 + 6.1 * (k / 20)});
+    std::vector<double> before;
+    double greatest = 0, now_s = 0;
+    for (int calm = 0; calm < 3; now_s += 0.002) {
+        const SceneFrame frame = staged.scene->advance({&camera, 1}, now_s);
+        std::vector<double> heights = surface.heights_m(frame.selection->draws[0], places, camera.eye, 0);
+        for (std::size_t k = 0; k < before.size(); ++k) {
+            if (std::isnan(heights[k]) || std::isnan(before[k])) continue;
+            const Lattice& l = stored.terrain().lattice();
+            const glm::dvec3 place{l.x_m(places[k].x), l.y_m(places[k].y), heights[k]};
+            greatest = std::max(
+                greatest, std::abs(heights[k] - before[k]) * camera.focal_px() / glm::distance(place, camera.eye));
+        }
+        before = std::move(heights);
+        calm = frame.stand_ins || frame.selection->growing ? 0 : calm + 1;
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    return greatest;
+}
+
+TEST_F(SceneOfHills, WhatASlowDiskBringsGrowsOutOfTheGroundAndDoesNotJump) {
+    const double at_once_px = greatest_step_px(*stored_, 0), grown_px = greatest_step_px(*stored_, 0.08);
+    EXPECT_GT(at_once_px, 20);
+    EXPECT_LT(grown_px, at_once_px / 4) << at_once_px;
+    RecordProperty("at_once_px", std::to_string(at_once_px));
+    RecordProperty("grown_px", std::to_string(grown_px));
 }
 
 SceneFrame advance_until(Scene& scene, const Camera& camera, const std::function<bool()>& done) {
