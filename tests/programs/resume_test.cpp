@@ -146,6 +146,7 @@ TEST_F(Resumed, AnotherBuildIsRefusedAndTheDifferenceNamed) {
     refused(command({"--texture-quality", "high"}), {"--texture-quality", "high now"});
     refused(command({"--tile-size", "17"}), {"--tile-size", "17 now"});
     refused(command({"--height-quantum", "0.5"}), {"--height-quantum", "0.5 now"});
+    refused(command({"--height-codec", "raw"}), {"--height-codec", "raw now"});
     refused(command({"--attribution", "somebody"}), {"attribution", "somebody"});
     refused(List{"build", dem_, "--imagery", south_, north_} + out, {"north.tif, south.tif", "south.tif, north.tif"});
     refused(List{"build", dem_, "--imagery", north_} + out, {"south.tif"});

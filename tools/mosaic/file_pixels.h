@@ -91,10 +91,10 @@ private:
     std::int64_t absent_;
 };
 
-/// Bands of 16 rows in memory.
+/// Bands of 8 rows in memory.
 class RowPixels final : public FilePixels {
 public:
-    static constexpr std::int64_t kBandRows = 16;
+    static constexpr std::int64_t kBandRows = 8;
 
     RowPixels(const PlacedFile& file, std::size_t index);
     void want(const SampleRectangle& part, std::int64_t until) override;

@@ -1,6 +1,7 @@
 #include "tools/pyramid/builder.h"
 
 #include <fmt/format.h>
+#include <malloc.h>
 #include <sys/statvfs.h>
 #include <tbb/global_control.h>
 #include <unistd.h>
@@ -120,8 +121,9 @@ private:
         if (state_.heights_done) {
             if (auto ok = take_up_heights(report); !ok) return ok;
             progress_.add(dem + lattice);
-        } else if (auto ok = make_heights(report); !ok) {
-            return ok;
+        } else {
+            if (auto ok = make_heights(report); !ok) return ok;
+            ::malloc_trim(0);  // what textures take should not come on top of it
         }
         if (auto ok = make_textures(images); !ok) return ok;
         return finish(report);

@@ -7,7 +7,7 @@
 namespace scree {
 namespace {
 
-constexpr std::size_t kMaxBytes = std::size_t{4} << 20;
+constexpr std::size_t kMaxBytes = std::size_t{2} << 20;
 
 }  // namespace
 

@@ -21,7 +21,7 @@ public:
     TileWriter(const TileWriter&) = delete;
     TileWriter& operator=(const TileWriter&) = delete;
 
-    /// Takes a row; waits while 4 MiB are under way. An error is that of any row before. Any thread.
+    /// Takes a row; waits while 2 MiB are under way. An error is that of any row before. Any thread.
     Result<void> put(TileKind kind, std::int64_t key, int codec, std::vector<std::uint8_t> payload);
     /// Waits until every row is in the store.
     Result<void> flush();

@@ -13,6 +13,7 @@ void TileWalk::check_texture_end(const Frame& frame) {
 }
 
 void TileWalk::check_texture(const Frame& frame) {
+    if (!refined(frame)) coarsest_texture_end_ = std::min(coarsest_texture_end_, frame.id.level);
     const TextureRow row = read_texture(frame.id);
     // Refined wholly or not at all.
     judge_texture(frame.id, row, refined(frame) ? frame.texture_children : std::uint8_t{0},
@@ -95,9 +96,10 @@ bool TileWalk::visit_texture_below(TileId id, const CellPresence& presence, Alph
     std::uint8_t mask = 0;
     if (!row.tile)
         complete = false;
-    else if (row.tile->child_mask == 0 || id.level >= dataset_.texture_deepest_level)
+    else if (row.tile->child_mask == 0 || id.level >= dataset_.texture_deepest_level) {
+        coarsest_texture_end_ = std::min(coarsest_texture_end_, id.level);
         mark_present(TexelGrid(dataset_, id.level), id.x, id.y, presence, alpha);
-    else
+    } else
         mask = visit_texture_children(id, presence, alpha, complete);
     judge_texture(id, row, mask, complete ? &alpha : nullptr);
     return complete && !failure_;

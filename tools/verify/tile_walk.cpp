@@ -296,6 +296,10 @@ void TileWalk::finish_dataset() {
     if (coarsest_leaf_ != dataset_.least_leaf_level())
         problems_.add(fmt::format("dataset: the coarsest leaf is of level {}, the tiles' of level {}",
                                   dataset_.least_leaf_level(), coarsest_leaf_));
+    // Districts stand on that level. Over absent ground textures may end at one that no tile here has.
+    if (coarsest_texture_end_ < dataset_.least_texture_level())
+        problems_.add(fmt::format("dataset: textures end at level {} or deeper, a tile's at level {}",
+                                  dataset_.least_texture_level(), coarsest_texture_end_));
     // The dataset speaks of source heights, before they were resampled and rounded.
     const double low = dataset_.height_m(lowest_n_), high = dataset_.height_m(highest_n_);
     const double slack =

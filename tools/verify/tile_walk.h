@@ -95,6 +95,7 @@ private:
     std::int64_t height_rows_ = 0, texture_rows_ = 0;
     std::int64_t present_cells_ = 0;
     int coarsest_leaf_ = kMaxLevel + 1;
+    int coarsest_texture_end_ = kMaxLevel + 1;
     std::int32_t lowest_n_ = kMaxHeightUnits, highest_n_ = -kMaxHeightUnits;
     bool all_read_ = true;
 };

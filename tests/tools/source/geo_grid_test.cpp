@@ -187,6 +187,21 @@ TEST(GeoGridFormat, TheTextIsThatOfTheDocument) {
     EXPECT_EQ((*back)[3], (std::array<double, 3>{-1, 0, 0}));
 }
 
+TEST(GeoGridFormat, NormalsAreOfLengthOneOrRefused) {
+    const auto grid = make_geo_grid(*make_lattice(300000, 2790000, 20, 1000, 1000, 5), "EPSG:32651");
+    ASSERT_TRUE(grid);
+    ASSERT_TRUE(grid->check().ok());
+    // A twentieth of a metre on the earth, times more or less.
+    for (const std::size_t node : {std::size_t{0}, grid->normals.size() / 2, grid->normals.size() - 1})
+        for (const auto& [length, fits] :
+             {std::pair(1 + 4e-9, true), std::pair(1 - 4e-9, true), std::pair(1 + 6e-9, false),
+              std::pair(1 - 6e-9, false), std::pair(0.0, false), std::pair(-1.0, true), std::pair(NAN, false)}) {
+            GeoGrid scaled = *grid;
+            for (double& v : scaled.normals[node]) v *= length;
+            EXPECT_EQ(scaled.check().ok(), fits) << "node " << node << ", length " << length;
+        }
+}
+
 TEST(GeoGridMaker, TakesNoMoreNodesThanItNeeds) {
     const Lattice window = *make_lattice(300000, 2790000, 20, 1000, 1000, 5);
     const auto grid = make_geo_grid(window, "EPSG:32651");

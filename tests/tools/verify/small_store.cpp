@@ -342,6 +342,10 @@ SmallStore make_small_store(const SmallTerrain& terrain) {
     add_heights(ground, store);
     store.recompute_ranges();
     add_textures(ground, store);
+    int coarsest = terrain.texture_deepest_level;
+    for (const auto& [id, tile] : store.textures)
+        if (terrain.varying && !ground.texture_depth.refined(id)) coarsest = std::min(coarsest, id.level);
+    if (coarsest < terrain.texture_deepest_level) store.dataset.coarsest_texture_level = coarsest;
     store.dataset.height_tiles = static_cast<std::int64_t>(store.heights.size());
     store.dataset.texture_tiles = static_cast<std::int64_t>(store.textures.size());
     return store;

@@ -565,6 +565,19 @@ TEST(VerifyDamage, WhereTexturesEnd) {
     EXPECT_GT(leaves, 3);
 }
 
+TEST(VerifyDamage, TheCoarsestLevelAtWhichTexturesEnd) {
+    const SmallStore sound = test::make_small_store(kVarying);
+    ASSERT_TRUE(sound.dataset.coarsest_texture_level);
+    const int truth = *sound.dataset.coarsest_texture_level;
+    ASSERT_LT(truth + 1, sound.dataset.texture_deepest_level);
+    EXPECT_TRUE(verify_varying_after({}).sound());
+    for (const std::optional<int> level : {std::optional<int>(truth + 1), std::optional<int>()}) {
+        const VerifyReport report =
+            verify_varying_after([&](SmallStore& s) { s.dataset.coarsest_texture_level = level; });
+        EXPECT_TRUE(names(report, "a tile's at level " + std::to_string(truth)));
+    }
+}
+
 TEST(VerifyDamage, ATextureMissingBelowOneWithOthers) {
     const VerifyReport report = verify_varying_after([](SmallStore& s) {
         auto last = std::prev(s.textures.end());

@@ -7,7 +7,9 @@
 
 #include "tests/common/test_support.h"
 #include "tests/tools/verify/small_store.h"
+#include "tools/source/crs.h"
 #include "tools/source/geo_grid_maker.h"
+#include "tools/verify/geo_check.h"
 
 namespace scree {
 namespace {
@@ -65,6 +67,56 @@ TEST(VerifyLonLat, AGridThatIsElsewhereIsAProblem) {
     ASSERT_EQ(report.problems.size(), 1u);
     EXPECT_NE(report.problems[0].find("longitudes and latitudes are off by 0.1"), std::string::npos)
         << report.problems[0];
+}
+
+TEST(VerifyLonLat, MayBeATenthMoreThanIsStated) {
+    test::SmallStore store = store_in_taiwan();
+    for (double& side : store.dataset.geo_grid->box_m) side += 0.1;
+    const GeoCheck moved = check_geo_grid(store.dataset);
+    ASSERT_TRUE(moved.error_m);
+    const double least = (*moved.error_m - 0.001) / 1.1;
+    store.dataset.geo_grid->error_m = least * 1.001;
+    EXPECT_FALSE(check_geo_grid(store.dataset).broken);
+    store.dataset.geo_grid->error_m = least * 0.999;
+    EXPECT_TRUE(check_geo_grid(store.dataset).broken);
+}
+
+// Two machines may have two shifts from a datum to WGS 84, each as far from the truth as PROJ says.
+TEST(VerifyLonLat, LeavesRoomForAShiftThatIsNotExact) {
+    test::SmallStore store = store_in_taiwan();
+    Dataset& d = store.dataset;
+    d.crs = "EPSG:23031";  // ED50, some metres
+    const auto to_degrees = CrsTransform::make(*Crs::parse(d.crs), *Crs::parse("EPSG:4326"));
+    ASSERT_TRUE(to_degrees);
+    const double accuracy_m = to_degrees->accuracy_m();
+    ASSERT_GT(accuracy_m, 0.5);
+    const auto moved_by = [&](double metres) {
+        d.geo_grid = make_geo_grid(d.lattice, d.crs);
+        for (std::size_t side : {1U, 3U}) d.geo_grid->box_m[side] += metres;
+        return check_geo_grid(d);
+    };
+    d.lattice.origin_y_m = 4800000;
+    const GeoCheck near = moved_by(1.9 * accuracy_m), far = moved_by(2.2 * accuracy_m);
+    EXPECT_FALSE(near.broken);
+    EXPECT_NE(near.reason.find("the datum shift is known to"), std::string::npos) << near.reason;
+    EXPECT_TRUE(far.broken);
+}
+
+TEST(VerifyLonLat, ADatumOfWhichPROJIsNotSureBreaksNothing) {
+    test::SmallStore store = store_in_taiwan();
+    Dataset& d = store.dataset;
+    d.crs = "+proj=utm +zone=51 +ellps=krass +type=crs";
+    const auto to_degrees = CrsTransform::make(*Crs::parse(d.crs), *Crs::parse("EPSG:4326"));
+    ASSERT_TRUE(to_degrees);
+    ASSERT_LT(to_degrees->accuracy_m(), 0);
+    d.geo_grid = make_geo_grid(d.lattice, d.crs);
+    ASSERT_TRUE(d.geo_grid);
+    for (double& side : d.geo_grid->box_m) side += 100;
+    const GeoCheck check = check_geo_grid(d);
+    EXPECT_FALSE(check.broken);
+    ASSERT_TRUE(check.error_m);
+    EXPECT_GT(*check.error_m, 100);
+    EXPECT_EQ(check.reason, "PROJ does not say how sure its datum shift is");
 }
 
 TEST(VerifyLonLat, SaysWhyNothingWasCompared) {
