@@ -58,6 +58,8 @@ std::int64_t TexturePlan::wish(const Cut& cut, std::span<const LodView> views, c
     const auto& nodes = cut.nodes();
     needs_.assign(nodes.size(), 0);
     wanted_.assign(residency.textures.headers.size(), false);
+    beside_.resize(residency.textures.headers.size());
+    ++wishes_;
     std::int64_t count = dataset_.lattice.root_rows * dataset_.lattice.root_columns;
     // Each page by its own nearest point: what a page wants its ancestors want the more, and nothing depends on how far
     // the pages below it are known.
@@ -147,23 +149,38 @@ void TexturePlan::mark_wanted(std::int32_t slot) {
     if (slot >= 0) wanted_[static_cast<std::size_t>(slot)] = true;
 }
 
+std::int32_t TexturePlan::wanted_beside(std::int32_t slot, TileId texture, TextureSide side) {
+    static constexpr std::array<std::array<int, 2>, 8> kSteps{
+        {{-1, -1}, {0, -1}, {1, -1}, {-1, 0}, {1, 0}, {-1, 1}, {0, 1}, {1, 1}}};
+    Beside& beside = beside_[static_cast<std::size_t>(slot)];
+    if (beside.asked_in != wishes_) {
+        beside.asked_in = wishes_;
+        beside.known = 0;
+    }
+    if ((beside.known >> side & 1) == 0) {
+        beside.known |= 1u << side;
+        beside.slots[side] = wanted_slot_at({texture.level, texture.x + kSteps[side][0], texture.y + kSteps[side][1]});
+    }
+    return beside.slots[side];
+}
+
 // Across which borders of its texture a page that shows it large must be filtered.
-void TexturePlan::add_neighbours(TileId texture, double texel_px, DrawItem& item) const {
+void TexturePlan::add_neighbours(TileId texture, double texel_px, DrawItem& item) {
     if (!(texel_px > kMagnifiedPx)) return;
     const TexturePlacement& t = item.texture;
     const bool west = t.offset_u <= 0, east = t.offset_u + t.scale >= 1;
     const bool north = t.offset_v <= 0, south = t.offset_v + t.scale >= 1;
-    const auto look = [&](bool touches, TextureSide side, int dx, int dy) {
-        if (touches) item.neighbour_textures[side] = wanted_slot_at({texture.level, texture.x + dx, texture.y + dy});
+    const auto look = [&](bool touches, TextureSide side) {
+        if (touches) item.neighbour_textures[side] = wanted_beside(t.slot, texture, side);
     };
-    look(north && west, kSideNorthWest, -1, -1);
-    look(north, kSideNorth, 0, -1);
-    look(north && east, kSideNorthEast, 1, -1);
-    look(west, kSideWest, -1, 0);
-    look(east, kSideEast, 1, 0);
-    look(south && west, kSideSouthWest, -1, 1);
-    look(south, kSideSouth, 0, 1);
-    look(south && east, kSideSouthEast, 1, 1);
+    look(north && west, kSideNorthWest);
+    look(north, kSideNorth);
+    look(north && east, kSideNorthEast);
+    look(west, kSideWest);
+    look(east, kSideEast);
+    look(south && west, kSideSouthWest);
+    look(south, kSideSouth);
+    look(south && east, kSideSouthEast);
 }
 
 // Metres of texture a pixel covers at the nearest point of a part of a page; infinite when no view sees it.
@@ -212,7 +229,7 @@ void TexturePlan::wish_deep(const CutNode& node, std::size_t index, const Part& 
     });
 }
 
-void TexturePlan::emit_parts(const Cut& cut, std::int32_t leaf, const DrawItem& item, DrawList& out) const {
+void TexturePlan::emit_parts(const Cut& cut, std::int32_t leaf, const DrawItem& item, DrawList& out) {
     const CutNode& node = cut.nodes()[static_cast<std::size_t>(leaf)];
     if (node.leaf && item.texture.scale == 1 && item.texture.slot >= 0)
         emit_part(node, {{}, item.texture.slot, 0}, item, out);
@@ -221,7 +238,7 @@ void TexturePlan::emit_parts(const Cut& cut, std::int32_t leaf, const DrawItem& 
 }
 
 // A part whose texture has no child there at all shows nothing there: no present cell lies under it.
-void TexturePlan::emit_part(const CutNode& node, const Part& part, const DrawItem& item, DrawList& out) const {
+void TexturePlan::emit_part(const CutNode& node, const Part& part, const DrawItem& item, DrawList& out) {
     std::array<Part, 4> children;
     int count = 0;
     bool any = false;

@@ -4,6 +4,7 @@
 // page that is a leaf of the stored pyramid is drawn in parts.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -35,7 +36,7 @@ public:
     /// that is blended in over its ancestor's. False: an ancestor's stands in for a texture that is missing.
     bool place(const Cut& cut, std::int32_t leaf, double fade_s, DrawItem& item);
     /// Appends the leaf whole, or in parts of the deepest textures that they deserve and have.
-    void emit_parts(const Cut& cut, std::int32_t leaf, const DrawItem& item, DrawList& out) const;
+    void emit_parts(const Cut& cut, std::int32_t leaf, const DrawItem& item, DrawList& out);
     /// Appends the slots that place() has dealt out since wish().
     void used(std::vector<std::int32_t>& slots) const;
     /// A texture dealt out since wish() is still being blended in.
@@ -55,10 +56,11 @@ private:
     template <class Visit>
     void for_each_deep_child(const CutNode& node, const Part& part, const Visit& visit) const;
     void wish_deep(const CutNode& node, std::size_t index, const Part& part);
-    void emit_part(const CutNode& node, const Part& part, const DrawItem& item, DrawList& out) const;
+    void emit_part(const CutNode& node, const Part& part, const DrawItem& item, DrawList& out);
     std::int32_t wanted_slot_at(TileId texture) const;
+    std::int32_t wanted_beside(std::int32_t slot, TileId texture, TextureSide side);
     void mark_wanted(std::int32_t slot);
-    void add_neighbours(TileId texture, double texel_px, DrawItem& item) const;
+    void add_neighbours(TileId texture, double texel_px, DrawItem& item);
 
     const Dataset& dataset_;
     std::vector<double> texel_m_;  ///< by level
@@ -67,6 +69,14 @@ private:
     const Residency* residency_ = nullptr;
     std::vector<double> needs_;  ///< by node of the cut; 0: its texture is not wanted
     std::vector<bool> wanted_;   ///< by texture slot
+    /// The wanted textures round one, as far as somebody has asked since wish(): several pages lie under one texture.
+    struct Beside {
+        std::uint64_t asked_in = 0;  ///< wishes_ then
+        std::uint32_t known = 0;     ///< bit s: slots[s] has been looked up
+        std::array<std::int32_t, 8> slots{};
+    };
+    std::vector<Beside> beside_;  ///< by texture slot
+    std::uint64_t wishes_ = 0;
     std::vector<DeepWish> deep_;
     std::vector<std::int32_t> used_;
     bool fading_ = false;

@@ -10,6 +10,8 @@ namespace {
 constexpr std::array<std::int32_t, 4> kNoChildren{kNotResident, kNotResident, kNotResident, kNotResident};
 // What 30 frames evict in a fast flight, about.
 constexpr std::size_t kEvictedRemembered = 1024;
+// Entries fetched before they are touched: one after the other they lie anywhere.
+constexpr std::ptrdiff_t kAhead = 8;
 
 std::size_t quadrant(TileId id) { return static_cast<std::size_t>(quadrant_of(id)); }
 
@@ -110,6 +112,7 @@ void TileCache::mark_used(std::int32_t slot) {
 
 void TileCache::touch_planned(std::span<const std::int32_t> slots) {
     for (auto slot = slots.rbegin(); slot != slots.rend(); ++slot) {
+        if (slots.rend() - slot > kAhead) __builtin_prefetch(entries_.data() + slot[kAhead]);
         assert(valid_resident(*slot));
         if (!valid_resident(*slot)) continue;
         entry(*slot).planned_in = frame_;
@@ -119,6 +122,7 @@ void TileCache::touch_planned(std::span<const std::int32_t> slots) {
 
 void TileCache::touch(std::span<const std::int32_t> slots) {
     for (auto slot = slots.rbegin(); slot != slots.rend(); ++slot) {
+        if (slots.rend() - slot > kAhead) __builtin_prefetch(entries_.data() + slot[kAhead]);
         assert(valid_resident(*slot));
         if (valid_resident(*slot)) mark_used(*slot);
     }

@@ -478,12 +478,16 @@ SceneFrame Scene::think(std::span<const Camera> views, double growth_s) {
 // Takes what arrives and chooses anew, until nothing is missing or so much time has passed.
 SceneFrame Scene::think_again(std::span<const Camera> views, double growth_s, SceneFrame frame, double seconds) {
     const auto start = std::chrono::steady_clock::now();
-    while (frame.stand_ins && !frame.taking_over && !pager_->idle() &&
+    // A frame that looks again takes as much again at most, so that none hitches; the first pictures take all.
+    std::int64_t left_bytes = growth_s > 0 ? options_.upload_bytes_per_frame : std::numeric_limits<std::int64_t>::max();
+    while (frame.stand_ins && !frame.taking_over && !pager_->idle() && left_bytes > 0 &&
            std::chrono::steady_clock::now() - start < std::chrono::duration<double>(seconds)) {
         // To wait for an arrival would be to wait as long as a slow disk likes.
         std::this_thread::sleep_for(kLook);
-        const int taken = pager_->take_arrivals(options_.upload_bytes_per_frame, false);
+        const std::int64_t before_bytes = pager_->counters().upload_bytes;
+        const int taken = pager_->take_arrivals(std::min(left_bytes, options_.upload_bytes_per_frame), false);
         if (taken == 0) continue;
+        left_bytes -= pager_->counters().upload_bytes - before_bytes;
         const std::int64_t uploads = frame.uploads + taken;
         const double before_ms = frame.select_ms;
         frame = think(views, growth_s);

@@ -257,6 +257,24 @@ TEST_F(SceneOfHills, AdvancingTakesNoMoreThanItsShareOfArrivals) {
     EXPECT_GT(uploads, 10);
 }
 
+TEST_F(SceneOfHills, AFrameThatLooksAgainTakesAsMuchAgainAtMost) {
+    SceneOptions options = small_options();
+    options.upload_bytes_per_frame = 1;
+    options.foresight_s = 0;
+    Staged staged(*stored_, options);
+    const Camera camera = stored_->camera(200, 512);
+    SceneFrame frame = staged.scene->advance({&camera, 1}, 0);
+    std::int64_t uploads = 0, twice = 0;
+    for (double now_s = 0; frame.stand_ins; now_s += 0.01) {
+        frame = staged.scene->advance({&camera, 1}, now_s, 10);
+        ASSERT_LE(frame.uploads, 2);
+        uploads += frame.uploads;
+        twice += frame.uploads == 2 ? 1 : 0;
+    }
+    EXPECT_GT(uploads, 10);
+    EXPECT_GT(twice, 1);
+}
+
 // How far, at most, a point of the ground moves across the screen from one frame to the next, 2 ms apart, while all
 // that one eye wants arrives from a slow disk.
 double greatest_step_px(const StoredTerrain& stored, double growth_s) {
