@@ -120,6 +120,15 @@ bool is_fingerprint(const std::string& text) {
     return text.size() == 16 && text.find_first_not_of("0123456789abcdef") == std::string::npos;
 }
 
+bool read_sidecars(const Json& json, std::map<std::string, std::string>& sidecars) {
+    if (!json.is_object()) return false;
+    for (const auto& [name, print] : json.items()) {
+        if (!print.is_string() || !is_fingerprint(print.get<std::string>())) return false;
+        sidecars[name] = print.get<std::string>();
+    }
+    return true;
+}
+
 }  // namespace
 
 double Dataset::texel_m(int level) const {
@@ -181,6 +190,7 @@ std::string dataset_to_json(const Dataset& d) {
         if (!s.fingerprint.empty()) sources.back()["fingerprint"] = s.fingerprint;
         if (s.box_m) sources.back()["box_m"] = *s.box_m;
         if (!s.layer.empty()) sources.back()["layer"] = s.layer;
+        if (!s.sidecars.empty()) sources.back()["sidecars"] = s.sidecars;
     }
     Json json = {{"format_version", kFormatVersion},
                  {"origin_x_m", d.lattice.origin_x_m},
@@ -273,6 +283,8 @@ Result<Dataset> dataset_from_json(const std::string& text) {
             if (!source.problem().empty()) return store_error("dataset: source " + source.problem());
             if (item.contains("fingerprint") && !is_fingerprint(record.fingerprint))
                 return store_error("dataset: source 'fingerprint' is not 16 hexadecimal digits");
+            if (item.contains("sidecars") && !read_sidecars(item.at("sidecars"), record.sidecars))
+                return store_error("dataset: source 'sidecars' are not names with 16 hexadecimal digits each");
             d.sources.push_back(std::move(record));
         }
     }

@@ -29,6 +29,8 @@ struct SourceRecord {
     /// counted in from another one. For updates; stores that were made without have neither.
     std::optional<std::array<double, 4>> box_m{};
     std::string layer{};
+    /// Of the files beside it that say what it does not: names, and fingerprints.
+    std::map<std::string, std::string> sidecars{};
 };
 
 struct Dataset {

@@ -70,6 +70,20 @@ TEST(DatasetJson, FingerprintsOfSourcesMayBeMissingAndAreCheckedWhereTheyStand) 
     }
 }
 
+TEST(DatasetJson, SidecarsOfASourceComeBack) {
+    Dataset d = example();
+    EXPECT_EQ(dataset_to_json(d).find("sidecars"), std::string::npos);
+    d.sources[0].sidecars = {{"dem.prj", "0123456789abcdef"}, {"dem.tfw", "fedcba9876543210"}};
+    const auto back = dataset_from_json(dataset_to_json(d));
+    ASSERT_TRUE(back) << back.error().message;
+    EXPECT_EQ(back->sources[0].sidecars, d.sources[0].sidecars);
+    EXPECT_TRUE(back->sources[1].sidecars.empty());
+    d.sources[0].sidecars["dem.prj"] = "no digits";
+    const auto refused = dataset_from_json(dataset_to_json(d));
+    ASSERT_FALSE(refused);
+    EXPECT_NE(refused.error().message.find("sidecars"), std::string::npos) << refused.error().message;
+}
+
 TEST(DatasetJson, TheLevelOfTheCoarsestLeafIsSaidWhereDepthVariesOnly) {
     Dataset d = example();
     EXPECT_EQ(dataset_to_json(d).find("coarsest_leaf_level"), std::string::npos);

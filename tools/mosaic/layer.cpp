@@ -81,6 +81,32 @@ Result<std::vector<Layer>> group_layers(const std::vector<PlacedFile>& files) {
     return layers;
 }
 
+namespace {
+
+PlaneBox box_around(const std::vector<double>& x, const std::vector<double>& y) {
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    PlaneBox box{kInfinity, kInfinity, -kInfinity, -kInfinity};
+    for (std::size_t k = 0; k < x.size(); ++k) {
+        if (!std::isfinite(x[k]) || !std::isfinite(y[k])) continue;
+        box.west = std::min(box.west, x[k]);
+        box.east = std::max(box.east, x[k]);
+        box.south = std::min(box.south, y[k]);
+        box.north = std::max(box.north, y[k]);
+    }
+    return box;
+}
+
+// Each within half a turn of the one before it, the first of a row of that of the row before.
+void follow(std::vector<double>& x, double turn) {
+    constexpr std::size_t kSide = kBoxSteps + 1;
+    for (std::size_t k = 1; k < x.size(); ++k) {
+        const double before = x[k % kSide == 0 ? k - kSide : k - 1];
+        if (std::isfinite(before)) x[k] -= turn * std::nearbyint((x[k] - before) / turn);
+    }
+}
+
+}  // namespace
+
 Result<PlaneBox> box_of(const PlacedFile& file, const Crs& to) {
     auto transform = CrsTransform::make(file.crs, to);
     if (!transform) return Error{transform.error().code, fmt::format("{}: {}", file.path, transform.error().message)};
@@ -94,14 +120,13 @@ Result<PlaneBox> box_of(const PlacedFile& file, const Crs& to) {
         }
     const double first_x = x.front(), first_y = y.front();
     transform->apply(x, y);
-    constexpr double kInfinity = std::numeric_limits<double>::infinity();
-    PlaneBox box{kInfinity, kInfinity, -kInfinity, -kInfinity};
-    for (std::size_t k = 0; k < x.size(); ++k) {
-        if (!std::isfinite(x[k]) || !std::isfinite(y[k])) continue;
-        box.west = std::min(box.west, x[k]);
-        box.east = std::max(box.east, x[k]);
-        box.south = std::min(box.south, y[k]);
-        box.north = std::max(box.north, y[k]);
+    PlaneBox box = box_around(x, y);
+    // Longitudes of a projected raster jump at the antimeridian. Followed from point to point they go on beyond it;
+    // what holds a pole or spans half the Earth has no narrow box either way.
+    if (to.turn() > 0 && box.east - box.west > to.turn() / 2) {
+        follow(x, to.turn());
+        const PlaneBox followed = box_around(x, y);
+        if (followed.east - followed.west < to.turn() / 2) box = followed;
     }
     if (!(box.west <= box.east))
         return Error{ErrorCode::input,

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <set>
 
@@ -27,13 +28,15 @@ struct OpenedFile {
     std::optional<Georeference> where;
 };
 
+// `heights`: how they are read; null: images.
 Result<std::vector<OpenedFile>> open_headers(const std::vector<std::string>& paths, const OpenOptions& options,
-                                             bool heights) {
+                                             const HeightReading* heights) {
     auto list = list_sources(paths);
     if (!list) return list.error();
     std::vector<OpenedFile> files;
     for (const std::string& path : *list) {
-        auto source = heights ? open_heights(path, options) : ImageSource::open(path, options);
+        auto source = heights != nullptr ? open_heights(path, options, heights->height_encoding)
+                                         : ImageSource::open(path, options);
         if (!source) return source.error();
         files.push_back({path, (*source)->info(), (*source)->georeference()});
     }
@@ -63,7 +66,7 @@ public:
 
 private:
     Result<void> open_files() {
-        auto heights = open_headers(request_.heights, request_.open, true);
+        auto heights = open_headers(request_.heights, request_.open, &request_.reading);
         if (!heights) return heights.error();
         heights_ = std::move(*heights);
         for (const OpenedFile& f : heights_)
@@ -71,7 +74,7 @@ private:
                 return input_error(fmt::format("{}: {} x {} samples; a terrain needs at least 2 x 2", f.path,
                                                f.info.width, f.info.height));
         if (request_.imagery.empty()) return {};
-        auto imagery = open_headers(request_.imagery, request_.open, false);
+        auto imagery = open_headers(request_.imagery, request_.open, nullptr);
         if (!imagery) return imagery.error();
         imagery_ = std::move(*imagery);
         return {};
@@ -169,7 +172,28 @@ private:
         return Crs::parse(heights_.front().where->crs);
     }
 
+    // What the user says of single files.
+    Result<void> name_datums() {
+        for (const std::string& word : request_.reading.source_vertical_crs) {
+            const auto said = parse_source_vertical_crs(word);
+            if (!said) return usage_error(fmt::format("--source-vertical-crs {} is not NAME=EPSG:n", word));
+            if (auto known = VerticalCrs::parse(said->crs); !known)
+                return usage_error(fmt::format("--source-vertical-crs {}: {}", word, known.error().message));
+            bool found = false;
+            for (PlacedFile& f : plan_.heights) {
+                if (std::filesystem::path(f.path).filename() != said->name) continue;
+                found = true;
+                f.where.vertical_datum = said->crs;
+            }
+            if (!found)
+                return usage_error(
+                    fmt::format("--source-vertical-crs {}: no file with heights is called {}", word, said->name));
+        }
+        return {};
+    }
+
     Result<void> check_datums() {
+        if (auto ok = name_datums(); !ok) return ok;
         if (request_.reading.vertical_crs) return adopt_datum(*request_.reading.vertical_crs);
         std::string first;
         for (const PlacedFile& f : plan_.heights) {

@@ -289,7 +289,7 @@ Result<std::vector<SpooledLayer<T>>> read_heights(const std::vector<PlacedFile>&
         if (!fresh) return fresh.error();
         for (const LayerMember& member : fresh->layer.members) {
             const PlacedFile& file = files[member.file];
-            auto dem = open_heights(file.path, options.open);
+            auto dem = open_heights(file.path, options.open, options.heights.height_encoding);
             if (!dem) return dem.error();
             if (auto same = check_unchanged(file, (*dem)->info()); !same) return same.error();
             std::optional<HeightShift> shift;

@@ -17,6 +17,7 @@
 #include "tools/pyramid/texture_stage.h"
 #include "tools/source/fingerprint.h"
 #include "tools/source/isolated_decoder.h"
+#include "tools/source/sidecars.h"
 
 namespace scree {
 namespace {
@@ -334,6 +335,7 @@ Result<BuildPlan> plan_build(const BuildOptions& o) {
             const PlaneBox& b = (*boxes)[k];
             record.box_m = {b.west, b.south, b.east, b.north};
             record.layer = layers[k];
+            record.sidecars = sidecar_prints((*files)[k].path);
             d.sources.push_back(std::move(record));
         }
     }

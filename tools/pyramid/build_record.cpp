@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cmath>
 #include <functional>
+#include <sstream>
 #include <vector>
 
 #include "tools/source/number_text.h"
@@ -167,6 +168,17 @@ const std::vector<RecordedOption>& recorded() {
         number<std::optional<double>>("height-scale", &BuildOptions::height_scale),
         number<double>("height-offset", &BuildOptions::height_offset_m),
         words("vertical-crs", &BuildOptions::vertical_crs),
+        {"source-vertical-crs",
+         [](const BuildOptions& o) {
+             return o.source_vertical_crs.empty() ? Text{} : fmt::format("{}", fmt::join(o.source_vertical_crs, "\n"));
+         },
+         [](const std::string& text, BuildOptions& o) {
+             std::istringstream lines(text);
+             for (std::string line; std::getline(lines, line);) o.source_vertical_crs.push_back(line);
+             return true;
+         }},
+        choice<HeightEncoding>("height-encoding", &BuildOptions::height_encoding,
+                               {{"terrarium", HeightEncoding::terrarium}, {"mapbox", HeightEncoding::mapbox}}),
         number<std::optional<double>>("nodata", &BuildOptions::nodata),
         number<std::optional<double>>("height-quantum", &BuildOptions::height_quantum_m),
         choice<HeightCodec>("height-codec", &BuildOptions::height_codec, height_codec_choices()),

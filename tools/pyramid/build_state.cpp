@@ -5,6 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "tools/source/sidecars.h"
+
 namespace scree {
 namespace {
 
@@ -17,6 +19,17 @@ std::string source_list(const Json& sources) {
     std::string names;
     for (const Json& source : sources) names += (names.empty() ? "" : ", ") + source.value("name", std::string());
     return names;
+}
+
+// Of sources of the same names.
+std::string sidecars_that_differ(const Json& begun, const Json& now) {
+    std::string said;
+    for (std::size_t k = 0; k < std::min(begun.size(), now.size()); ++k) {
+        const auto of = [&](const Json& sources) { return sources[k].value("sidecars", SidecarPrints()); };
+        const std::string difference = sidecar_difference(of(begun), of(now));
+        if (!difference.empty()) said += (said.empty() ? "" : ", ") + difference;
+    }
+    return said;
 }
 
 std::string text_of(const Json& value) { return value.is_string() ? value.get<std::string>() : value.dump(); }
@@ -95,6 +108,8 @@ std::optional<std::string> identity_difference(const std::string& begun_text, co
         return "another version of this program";
     const std::string sources_then = source_list(begun.at("sources")), sources_now = source_list(now.at("sources"));
     if (sources_then != sources_now) return fmt::format("the sources {}, which are {} now", sources_then, sources_now);
+    if (auto sidecars = sidecars_that_differ(begun.at("sources"), now.at("sources")); !sidecars.empty())
+        return fmt::format("other sidecars: since then {}", sidecars);
     if (begun.at("sources") != now.at("sources"))
         return fmt::format("sources of the same names ({}) and other content", sources_then);
     if (auto difference = option_difference(begun.at("options"), now.at("options"))) return difference;

@@ -25,7 +25,7 @@ Error interrupted() { return {ErrorCode::interrupted, "stopped"}; }
 // The one DEM whose rows are the lattice's.
 Result<void> spool_in_place(const BuildPlan& plan, const BuildOptions& options, HeightSpool& spool, Progress& progress,
                             const std::atomic<bool>& stop, std::vector<std::string>& warnings) {
-    auto dem = open_heights(plan.mosaic.heights.front().path, plan.open);
+    auto dem = open_heights(plan.mosaic.heights.front().path, plan.open, options.height_encoding);
     if (!dem) return dem.error();
     const ImageInfo& info = (*dem)->info();
     if (info.width != spool.width() || info.height != spool.height())

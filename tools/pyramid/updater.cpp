@@ -26,6 +26,7 @@
 #include "tools/source/fingerprint.h"
 #include "tools/source/geo_grid_maker.h"
 #include "tools/source/isolated_decoder.h"
+#include "tools/source/sidecars.h"
 #include "tools/source/source_list.h"
 
 namespace scree {
@@ -60,15 +61,23 @@ public:
 
     Result<std::string> find(const SourceRecord& record) const {
         bool seen = false;
+        std::string sidecars;
         for (const fs::path& folder : folders_) {
             const fs::path path = folder / record.name;
             std::error_code error;
             const auto bytes = fs::file_size(path, error);
             if (error) continue;
             seen = true;
-            if (static_cast<std::int64_t>(bytes) == record.bytes && fingerprint_of(path.string()) == record.fingerprint)
-                return path.string();
+            if (static_cast<std::int64_t>(bytes) != record.bytes || fingerprint_of(path.string()) != record.fingerprint)
+                continue;
+            sidecars = sidecar_difference(record.sidecars, sidecar_prints(path.string()));
+            if (sidecars.empty()) return path.string();
         }
+        if (!sidecars.empty())
+            return Error{ErrorCode::input,
+                         fmt::format("{}: a source of the store whose sidecars are others now ({}): given again it is "
+                                     "read anew, --remove {} takes it out",
+                                     record.name, sidecars, record.name)};
         std::vector<std::string> names;
         for (const fs::path& folder : folders_) names.push_back(folder.string());
         return Error{ErrorCode::input,
@@ -205,9 +214,9 @@ private:
 
     bool same_heights() const {
         const auto records = [](const Dataset& d) {
-            std::vector<std::tuple<std::string, std::int64_t, std::string>> list;
+            std::vector<std::tuple<std::string, std::int64_t, std::string, SidecarPrints>> list;
             for (const SourceRecord& s : d.sources)
-                if (s.role == kHeights) list.emplace_back(s.name, s.bytes, s.fingerprint);
+                if (s.role == kHeights) list.emplace_back(s.name, s.bytes, s.fingerprint, s.sidecars);
             return list;
         };
         return records(dataset()) == records(plan_->dataset) && options_.dems.empty();
@@ -369,7 +378,8 @@ private:
                 std::find(named_.begin(), named_.end(), s.name) != named_.end() ||
                 std::find(options_.remove.begin(), options_.remove.end(), s.name) != options_.remove.end();
             const auto same = std::find_if(other.sources.begin(), other.sources.end(), [&](const SourceRecord& o) {
-                return o.role == s.role && o.name == s.name && o.bytes == s.bytes && o.fingerprint == s.fingerprint;
+                return o.role == s.role && o.name == s.name && o.bytes == s.bytes && o.fingerprint == s.fingerprint &&
+                       o.sidecars == s.sidecars;
             });
             if (named || same == other.sources.end())
                 mark_box(s, *s.box_m);

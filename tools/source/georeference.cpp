@@ -248,16 +248,21 @@ Result<std::optional<Georeference>> read_geotiff(const std::string& path) {
     }
 }
 
+std::optional<std::string> world_file_beside(const std::string& image_path) {
+    for (const std::string& name : world_file_names(image_path)) {
+        std::error_code ignored;
+        if (name != image_path && std::filesystem::is_regular_file(name, ignored)) return name;
+    }
+    return std::nullopt;
+}
+
 Result<std::optional<Georeference>> read_world_file(const std::string& image_path) {
     try {
-        for (const std::string& name : world_file_names(image_path)) {
-            std::error_code ignored;
-            if (name == image_path || !std::filesystem::is_regular_file(name, ignored)) continue;
-            Result<Georeference> reference = parse_world_file(name);
-            if (!reference) return reference.error();
-            return std::optional<Georeference>(std::move(*reference));
-        }
-        return std::optional<Georeference>{};
+        const auto name = world_file_beside(image_path);
+        if (!name) return std::optional<Georeference>{};
+        Result<Georeference> reference = parse_world_file(*name);
+        if (!reference) return reference.error();
+        return std::optional<Georeference>(std::move(*reference));
     } catch (const std::exception& problem) {
         return Error{ErrorCode::input,
                      fmt::format("{}: its world file cannot be read ({})", image_path, problem.what())};

@@ -42,6 +42,9 @@ Result<std::optional<Georeference>> read_geotiff(const std::string& path);
 /// Reads PATH's world file (.tfw .pgw .jgw .wld, also .tifw-style double extension, either case) when there is one.
 Result<std::optional<Georeference>> read_world_file(const std::string& image_path);
 
+/// The world file that is read for PATH, where there is one.
+std::optional<std::string> world_file_beside(const std::string& image_path);
+
 /// What places an image: its GeoTIFF tags, else its .aux.xml (pam_file.h), else its world file. A TIFF with CRS keys
 /// but no transformation takes the transformation from its world file and keeps the CRS of its keys. Where there are
 /// none, the CRS is that of the .aux.xml, else of a .prj file (projection_file.h).

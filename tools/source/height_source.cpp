@@ -11,6 +11,63 @@ namespace {
 Error input_error(std::string message) { return {ErrorCode::input, std::move(message)}; }
 Error usage_error(std::string message) { return {ErrorCode::usage, std::move(message)}; }
 
+// Three bands of eight bits as one of integers.
+class EncodedHeights final : public ImageSource {
+public:
+    EncodedHeights(std::unique_ptr<ImageSource> colours, HeightEncoding encoding) : colours_(std::move(colours)) {
+        info_ = colours_->info();
+        info_.channels = 1;
+        info_.alpha_channel = -1;
+        info_.type = SampleType::u32;
+        info_.nodata.reset();
+        info_.values_are_colours = false;
+        info_.shown_bands = 1;
+        const bool terrarium = encoding == HeightEncoding::terrarium;
+        info_.value_scale = terrarium ? 1.0 / 256 : 0.1;
+        info_.value_offset = terrarium ? -32768 : -10000;
+    }
+
+    const ImageInfo& info() const override { return info_; }
+    const std::optional<Georeference>& georeference() const override { return colours_->georeference(); }
+    Result<void> read_channel(std::int64_t begin, std::int64_t end, std::span<float> out) override {
+        return read(begin, end, out);
+    }
+    Result<void> read_channel(std::int64_t begin, std::int64_t end, std::span<double> out) override {
+        return read(begin, end, out);
+    }
+    Result<void> read_rgba8(std::int64_t begin, std::int64_t end, std::span<std::uint8_t> out) override {
+        return colours_->read_rgba8(begin, end, out);
+    }
+
+private:
+    // Below 2^24: floats hold them. What is not wholly opaque is void.
+    template <class T>
+    Result<void> read(std::int64_t begin, std::int64_t end, std::span<T> out) {
+        rgba_.resize(out.size() * 4);
+        if (auto ok = colours_->read_rgba8(begin, end, rgba_); !ok) return ok;
+        for (std::size_t k = 0; k < out.size(); ++k) {
+            const std::uint8_t* p = rgba_.data() + 4 * k;
+            out[k] = p[3] == 255 ? static_cast<T>(p[0] << 16 | p[1] << 8 | p[2]) : std::numeric_limits<T>::quiet_NaN();
+        }
+        return {};
+    }
+
+    std::unique_ptr<ImageSource> colours_;
+    ImageInfo info_;
+    std::vector<std::uint8_t> rgba_;
+};
+
+Result<std::unique_ptr<ImageSource>> open_encoded(const std::string& path, const OpenOptions& options,
+                                                  HeightEncoding encoding) {
+    auto colours = ImageSource::open(path, options);
+    if (!colours) return colours.error();
+    const ImageInfo& info = (*colours)->info();
+    if (!info.eight_bit || info.shown_bands != 3 || info.channels > 4)
+        return input_error(fmt::format("{}: {} channels{}; --height-encoding asks for red, green and blue of 8 bits",
+                                       path, info.channels, info.eight_bit ? "" : " of more than 8 bits"));
+    return std::unique_ptr<ImageSource>(std::make_unique<EncodedHeights>(std::move(*colours), encoding));
+}
+
 }  // namespace
 
 Result<void> check_height_reading(const HeightReading& o) {
@@ -20,11 +77,24 @@ Result<void> check_height_reading(const HeightReading& o) {
         return usage_error(fmt::format("--height-offset {} m is not within 1e7 m", o.height_offset_m));
     if (o.spacing_m && !(*o.spacing_m >= 1e-6 && *o.spacing_m <= 1e6))
         return usage_error(fmt::format("--spacing {} m is outside 1e-6..1e6", *o.spacing_m));
+    for (const std::string& word : o.source_vertical_crs)
+        if (!parse_source_vertical_crs(word))
+            return usage_error(fmt::format("--source-vertical-crs {} is not NAME=EPSG:n", word));
     return {};
 }
 
-Result<std::unique_ptr<ImageSource>> open_heights(const std::string& path, const OpenOptions& options) {
-    auto dem = ImageSource::open(path, options);
+std::optional<SourceVerticalCrs> parse_source_vertical_crs(const std::string& word) {
+    const std::size_t equals = word.rfind('=');
+    if (equals == std::string::npos || equals == 0 || equals + 1 == word.size()) return std::nullopt;
+    return SourceVerticalCrs{word.substr(0, equals), word.substr(equals + 1)};
+}
+
+Result<std::unique_ptr<ImageSource>> open_heights(const std::string& path, const OpenOptions& options,
+                                                  HeightEncoding encoding) {
+    OpenOptions plain = options;
+    plain.colours = {};  // bands, stretch and nodata of the imagery are not the heights'
+    if (encoding != HeightEncoding::values) return open_encoded(path, plain, encoding);
+    auto dem = ImageSource::open(path, plain);
     if (dem && (*dem)->info().channels > 2)
         return input_error(fmt::format("{}: {} channels; heights are one channel: is this the imagery?", path,
                                        (*dem)->info().channels));

@@ -20,6 +20,7 @@
 #include "tools/source/isolated_decoder.h"
 #include "tools/source/pam_file.h"
 #include "tools/source/pixel_decoder.h"
+#include "tools/source/projection_file.h"
 #include "tools/source/sample_memory.h"
 
 namespace scree {
@@ -282,10 +283,22 @@ Result<void> open_mask_beside(const std::string& path, const OpenOptions& option
     return source.use_mask(*header, std::move(*decoder), options);
 }
 
+// Where the file itself says nothing of it.
+void take_scale(const PamFile& pam, ImageHeader& header) {
+    if (header.value_scale != 1 || header.value_offset != 0) return;
+    header.value_scale = pam.scale.value_or(1);
+    header.value_offset = pam.offset.value_or(0);
+}
+
 Result<std::unique_ptr<ImageSource>> open_grid(const std::string& path, GridFile grid, const OpenOptions& options) {
     ImageHeader header;
     header.rows_per_strip = grid.rows_per_unit;
     header.nodata = std::move(grid.nodata);
+    Result<PamFile> pam = read_pam(path);
+    if (!pam) return pam.error();
+    take_scale(*pam, header);
+    if (grid.georeference && grid.georeference->height_unit_m == 0)
+        grid.georeference->height_unit_m = length_unit_m(pam->unit);
     auto source = std::make_unique<DecodedSource>(path, header, decode_here(std::move(grid.decoder)));
     if (Result<void> prepared = source->prepare(options); !prepared) return prepared.error();
     if (Result<void> masked = open_mask_beside(path, options, *source); !masked) return masked.error();
@@ -322,11 +335,10 @@ Result<std::unique_ptr<ImageSource>> open_image(const std::string& path, const O
                     "at least {} MiB for it, or store the file in tiles",
                     header->width, header->height, options.max_unit_bytes / kMiB, least / kMiB + 1));
     }
-    if (!header->nodata) {
-        Result<PamFile> pam = read_pam(path);
-        if (!pam) return pam.error();
-        header->nodata = std::move(pam->nodata);
-    }
+    Result<PamFile> pam = read_pam(path);
+    if (!pam) return pam.error();
+    if (!header->nodata) header->nodata = std::move(pam->nodata);
+    take_scale(*pam, *header);
     Result<std::unique_ptr<BandDecoder>> decoder = open_isolated_decoder(path, *header, limits);
     if (!decoder) return decoder.error();
     auto source = std::make_unique<DecodedSource>(path, *header, std::move(*decoder));
@@ -334,6 +346,7 @@ Result<std::unique_ptr<ImageSource>> open_image(const std::string& path, const O
     if (Result<void> masked = open_mask(path, *header, options, *source); !masked) return masked.error();
     Result<std::optional<Georeference>> georeference = read_georeference(path);
     if (!georeference) return georeference.error();
+    if (*georeference && (*georeference)->height_unit_m == 0) (*georeference)->height_unit_m = length_unit_m(pam->unit);
     source->place(std::move(*georeference));
     return std::unique_ptr<ImageSource>(std::move(source));
 }

@@ -103,6 +103,14 @@ Result<PamFile> parse_pam(std::string_view xml) {
     if (const std::string_view text = trimmed(text_of(parts.band, "NoDataValue"));
         !text.empty() && text.size() <= kMaxNodataBytes)
         pam.nodata = std::string(text);
+    const auto number_of = [&](const char* name) {
+        const auto number = parse_number(trimmed(text_of(parts.band, name)));
+        return number && std::isfinite(*number) ? number : std::nullopt;
+    };
+    pam.scale = number_of("Scale");
+    if (pam.scale == 0.0) pam.scale.reset();
+    pam.offset = number_of("Offset");
+    pam.unit = unescaped(trimmed(text_of(parts.band, "UnitType")).substr(0, kMaxNodataBytes));
     return pam;
 }
 

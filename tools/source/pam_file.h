@@ -16,8 +16,11 @@ struct PamFile {
     /// x = t[0] + column * t[1] + row * t[2], y = t[3] + column * t[4] + row * t[5], from the outer corner of the first
     /// sample.
     std::optional<std::array<double, 6>> geotransform;
-    std::string crs;                    ///< WKT; empty: none, or one of no place on the Earth
-    std::optional<std::string> nodata;  ///< of the first band, as written
+    std::string crs;  ///< WKT; empty: none, or one of no place on the Earth
+    // Of the first band:
+    std::optional<std::string> nodata;    ///< as written
+    std::optional<double> scale, offset;  ///< z = value * scale + offset
+    std::string unit;                     ///< of z
 };
 
 /// Elements that are not asked for are passed over, and so is text that is no XML. Errors: ErrorCode::input for a

@@ -16,15 +16,6 @@ namespace {
 constexpr std::int64_t kMaxBytes = 65536;
 constexpr std::size_t kMaxNameBytes = 200;
 
-std::optional<std::string> prj_beside(const std::string& path) {
-    for (const char* extension : {".prj", ".PRJ", ".Prj"}) {
-        std::error_code ignored;
-        const std::string name = std::filesystem::path(path).replace_extension(extension).string();
-        if (name != path && std::filesystem::is_regular_file(name, ignored)) return name;
-    }
-    return std::nullopt;
-}
-
 bool looks_like_wkt(std::string_view text) {
     const std::string start = upper_case(text.substr(0, 16));
     for (const char* word : {"PROJCS[", "GEOGCS[", "PROJCRS[", "GEOGCRS[", "GEODCRS[", "COMPD_CS[", "COMPOUNDCRS[",
@@ -77,8 +68,17 @@ std::string epsg_of_old_text(std::map<std::string, std::string>& values) {
 
 }  // namespace
 
+std::optional<std::string> projection_file_beside(const std::string& path) {
+    for (const char* extension : {".prj", ".PRJ", ".Prj"}) {
+        std::error_code ignored;
+        const std::string name = std::filesystem::path(path).replace_extension(extension).string();
+        if (name != path && std::filesystem::is_regular_file(name, ignored)) return name;
+    }
+    return std::nullopt;
+}
+
 Result<void> take_projection_file(const std::string& path, Georeference& place) {
-    const auto name = prj_beside(path);
+    const auto name = projection_file_beside(path);
     if (!name) return {};
     const Result<std::string> read = read_text_file(*name, kMaxBytes);
     if (!read) return read.error();

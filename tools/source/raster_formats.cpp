@@ -39,10 +39,19 @@ bool begins_as_tiff_or_erdas(std::string_view start) {
            start.starts_with("EHFA_HEADER_TAG");
 }
 
-bool is_of(const GridFormat& format, const std::string& path, std::string_view start) {
+// Four bytes or more that no raw grid of heights begins with by chance. Shorter ones (JPEG, BMP, PNM) may well be
+// heights: there the name counts.
+bool begins_as_image_for_certain(std::string_view start) {
+    const auto begins = [&](std::string_view signature) { return start.starts_with(signature); };
+    using namespace std::string_view_literals;
+    return begins("II*\0"sv) || begins("MM\0*"sv) || begins("II+\0"sv) || begins("MM\0+"sv) ||
+           begins("\x89PNG\r\n\x1a\n") || begins("\0\0\0\x0CjP  "sv) ||
+           (begins("RIFF") && start.size() >= 12 && start.substr(8, 4) == "WEBP");
+}
+
+bool is_called_so(const GridFormat& format, const std::string& path, std::string_view start) {
     const std::string extension = extension_of(path);
     if (holds(format.extensions, extension)) return true;
-    if (format.begins_so != nullptr && format.begins_so(start)) return true;
     return holds(format.headered_extensions, extension) && !begins_as_tiff_or_erdas(start) &&
            header_beside(path).has_value();
 }
@@ -93,8 +102,12 @@ std::span<const GridFormat> grid_formats() {
 }
 
 const GridFormat* grid_format_of(const std::string& path, std::string_view start) {
+    // How it begins counts before what it is called.
     for (const GridFormat& format : grid_formats())
-        if (is_of(format, path, start)) return &format;
+        if (format.begins_so != nullptr && format.begins_so(start)) return &format;
+    if (begins_as_image_for_certain(start)) return nullptr;
+    for (const GridFormat& format : grid_formats())
+        if (is_called_so(format, path, start)) return &format;
     return nullptr;
 }
 

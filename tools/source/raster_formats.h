@@ -22,7 +22,7 @@ using Extensions = std::vector<std::string_view>;
 /// DEMs that are read by our own code (grid_file.h).
 struct GridFormat {
     std::string_view name = {};           ///< as messages and docs/building-pyramids.md say it; several parted by ", "
-    Extensions extensions = {};           ///< what is called so is of this format, whatever it holds
+    Extensions extensions = {};           ///< what is called so is of this format, unless it begins as another
     Extensions headered_extensions = {};  ///< so is what is called so where a text header stands beside it
     Extensions shared_extensions =
         {};  ///< formats that are not read are called so, too: only what begins so is of this one

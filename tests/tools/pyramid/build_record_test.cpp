@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "common/store/height_codec.h"
+#include "tools/pyramid/build_state.h"
 
 namespace scree {
 namespace {
@@ -19,6 +20,8 @@ const Record kAll = {{"crs", "EPSG:32633"},
                      {"height-scale", "0.1"},
                      {"height-offset", "-7"},
                      {"vertical-crs", "EPSG:5773"},
+                     {"source-vertical-crs", "a.tif=EPSG:5773\nb=c.tif=EPSG:3855"},
+                     {"height-encoding", "mapbox"},
                      {"nodata", "-9999"},
                      {"height-quantum", "0.25"},
                      {"height-codec", "raw"},
@@ -41,6 +44,23 @@ TEST(BuildRecord, EveryOptionComesBack) {
     BuildOptions options;
     ASSERT_TRUE(apply_record(kAll, options));
     EXPECT_EQ(options_record(options, options.colours.stretch), kAll);
+}
+
+TEST(BuildState, NamesTheSidecarThatChanged) {
+    Dataset begun;
+    begun.sources.push_back({"a.flt", "heights", 8, 2, 2, "0123456789abcdef"});
+    begun.sources.push_back({"b.flt", "heights", 8, 2, 2, "0123456789abcdef"});
+    begun.sources[1].sidecars = {{"b.hdr", "00000000000000aa"}, {"b.prj", "00000000000000bb"}};
+    const auto difference = [&](const std::map<std::string, std::string>& sidecars) {
+        Dataset now = begun;
+        now.sources[1].sidecars = sidecars;
+        return identity_difference(identity_of(begun), identity_of(now)).value_or("none");
+    };
+    EXPECT_EQ(difference(begun.sources[1].sidecars), "none");
+    EXPECT_EQ(difference({{"b.hdr", "00000000000000aa"}, {"b.prj", "00000000000000bc"}}),
+              "other sidecars: since then b.prj has changed");
+    EXPECT_EQ(difference({{"b.prj", "00000000000000bb"}}), "other sidecars: since then b.hdr is gone");
+    EXPECT_EQ(difference({}), "other sidecars: since then b.hdr is gone, b.prj is gone");
 }
 
 TEST(BuildRecord, DefaultsAreNotRecorded) { EXPECT_EQ(options_record({}, std::nullopt), Record{}); }
