@@ -195,7 +195,8 @@ TEST(GeoGridFormat, NormalsAreOfLengthOneOrRefused) {
     for (const std::size_t node : {std::size_t{0}, grid->normals.size() / 2, grid->normals.size() - 1})
         for (const auto& [length, fits] :
              {std::pair(1 + 4e-9, true), std::pair(1 - 4e-9, true), std::pair(1 + 6e-9, false),
-              std::pair(1 - 6e-9, false), std::pair(0.0, false), std::pair(-1.0, true), std::pair(NAN, false)}) {
+              std::pair(1 - 6e-9, false), std::pair(0.0, false), std::pair(-1.0, true),
+              std::pair(std::nan(""), false)}) {
             GeoGrid scaled = *grid;
             for (double& v : scaled.normals[node]) v *= length;
             EXPECT_EQ(scaled.check().ok(), fits) << "node " << node << ", length " << length;
