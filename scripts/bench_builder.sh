@@ -9,7 +9,9 @@
 #     --data FOLDER     where the inputs are made and kept (bench-builder-data): 3.5 GB, with `large` 8 GB
 #     --build FOLDER    the build to measure (build/release)
 #
-# Parts: ortho dem large threads memory update peers; all but `large` when none is named. docs/measuring.md says what the lines mean.
+# Parts: ortho dem large giga threads memory update peers; all but `large` and `giga` when none is named. docs/measuring.md says what the
+# lines mean. `memory` compares two sizes of strips, one-row strips, tiles, a mosaic of 300 files and a warp (with gdal-bin); `giga` is
+# 65536^2 pixels of one JPEG file that lies in 16 places.
 # Nothing else should run meanwhile. Synthetic inputs: the same bytes everywhere.
 set -euo pipefail
 
@@ -17,7 +19,7 @@ root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd -P)
 . "$root/scripts/report_values.sh"
 
 out=bench-builder data=bench-builder-data build=$root/build/release
-usage() { sed -n 's/^# \{0,1\}//; 2,15p' "${BASH_SOURCE[0]}"; }
+usage() { sed -n '2,/^set /{/^set /d; s/^# \{0,1\}//; p}' "${BASH_SOURCE[0]}"; }
 parts=()
 while (($# > 0)); do
     case $1 in
@@ -27,7 +29,7 @@ while (($# > 0)); do
             shift
             ;;
         -h | --help) usage; exit 0 ;;
-        ortho | dem | large | threads | memory | update | peers) parts+=("$1") ;;
+        ortho | dem | large | giga | threads | memory | update | peers) parts+=("$1") ;;
         *) usage >&2; exit 2 ;;
     esac
     shift
@@ -114,14 +116,76 @@ if wants threads; then
         line "threads$threads"
     done
     echo "    two are $(ratio_of "$(field threads1 seconds)" "$(field threads2 seconds)") times as fast"
+    # With one thread the decoder's process and the thread that writes have the other core to themselves.
+    if has taskset; then
+        scree_anywhere=$scree
+        one_core() { taskset -c 0 "$scree_anywhere" "$@"; }
+        scree=one_core
+        built onecore "$data/synth/dem.tif" --imagery "$data/synth/ortho.tif" --threads 1
+        scree=$scree_anywhere
+        line onecore
+        echo "    two threads on all cores are $(ratio_of "$(field onecore seconds)" "$(field threads2 seconds)") times as fast as one core"
+    fi
 fi
 if wants memory; then
     echo "Peak memory from 1 to 16 times the input, --memory 192M"
     land small 1025 10 4
-    built small "$data/small/dem.tif" --imagery "$data/small/ortho.tif" --memory 192M
-    built sixteen "$data/synth/dem.tif" --imagery "$data/synth/ortho.tif" --memory 192M
-    line small
-    line sixteen
+    # compared NAME SMALL LARGE: images over the two pieces of land
+    compared() {
+        built "small_$1" "$data/small/dem.tif" --imagery "$2" --memory 192M
+        built "sixteen_$1" "$data/synth/dem.tif" --imagery "$3" --memory 192M
+        awk -v n="$1" -v a="$(field "small_$1" peak_rss_bytes)" -v b="$(field "sixteen_$1" peak_rss_bytes)" 'BEGIN {
+            printf "    %-14s %6.1f MiB, %6.1f MiB: %+.0f %%\n", n, a / 1048576, b / 1048576, (b / a - 1) * 100 }'
+        rm -f -- "$out/small_$1.scree" "$out/sixteen_$1.scree"
+    }
+    # three_hundred FROM FOLDER: the image in 20 x 15 files
+    three_hundred() {
+        [[ -e $2/done ]] && return
+        mkdir -p -- "$2"
+        local size r c
+        size=$(gdalinfo "$1" | sed -n 's/^Size is \([0-9]*\),.*/\1/p')
+        for ((r = 0; r < 15; r++)); do
+            for ((c = 0; c < 20; c++)); do
+                gdal_translate -q "${jpeg[@]}" -srcwin $((c * size / 20)) $((r * size / 15)) $(((c + 1) * size / 20 - c * size / 20)) \
+                    $(((r + 1) * size / 15 - r * size / 15)) "$1" "$2/t_${r}_$c.tif"
+            done
+        done
+        rm -f -- "$2"/*.aux.xml
+        touch "$2/done"
+    }
+    compared strips "$data/small/ortho.tif" "$data/synth/ortho.tif"
+    if has gdalwarp; then
+        jpeg=(-co COMPRESS=JPEG -co TILED=YES -co PHOTOMETRIC=YCBCR -co JPEG_QUALITY=85)
+        for land in small synth; do
+            variant "$data/$land/ortho.tif" "$data/$land/rows.tif" -co BLOCKYSIZE=1
+            variant "$data/$land/ortho.tif" "$data/$land/tiles.tif" "${jpeg[@]}"
+            three_hundred "$data/$land/ortho.tif" "$data/$land/mosaic"
+            [[ -e $data/$land/degrees.tif ]] ||
+                gdalwarp -q -r near -t_srs EPSG:4326 -dstalpha -co COMPRESS=DEFLATE -co TILED=YES "$data/$land/tiles.tif" "$data/$land/degrees.tif"
+        done
+        compared one-row "$data/small/rows.tif" "$data/synth/rows.tif"
+        compared tiles "$data/small/tiles.tif" "$data/synth/tiles.tif"
+        compared mosaic-of-300 "$data/small/mosaic" "$data/synth/mosaic"
+        compared warp "$data/small/degrees.tif" "$data/synth/degrees.tif"
+    fi
+fi
+if wants giga; then
+    echo "65536^2 pixels: a 16384^2 JPEG in 16 places"
+    has gdal_translate || { echo "    gdal_translate is not installed"; exit 0; }
+    land ortho 1025 40 16
+    land giga 2049 80 0
+    base=$data/giga/base.tif
+    variant "$data/ortho/ortho.tif" "$base" -co PROFILE=BASELINE -co COMPRESS=JPEG -co TILED=YES -co PHOTOMETRIC=YCBCR -co JPEG_QUALITY=85
+    mkdir -p -- "$data/giga/places"
+    for ((k = 0; k < 16; k++)); do
+        ln -f -- "$base" "$data/giga/places/t$k.tif"
+        printf '2.5\n0\n0\n-2.5\n%s\n%s\n' "$((400000 + k % 4 * 40960 + 1)).25" "$((5300000 - k / 4 * 40960 - 2)).75" >"$data/giga/places/t$k.tfw"
+    done
+    built giga "$data/giga/dem.tif" --imagery "$data/giga/places" --assume-crs EPSG:32633 --memory 192M
+    line giga
+    awk -v all="$(field giga cpu_seconds)" -v decode="$(reading "$base")" 'BEGIN {
+        printf "    decoding %.2f CPU s; beyond it %.2f ns a source pixel\n", 16 * decode, (all - 16 * decode) / (65536 * 65536) * 1e9 }'
+    rm -f -- "$out/giga.scree"
 fi
 if wants update; then
     echo "Updating a 4097^2 + 16384^2 store by a 1024^2 image"

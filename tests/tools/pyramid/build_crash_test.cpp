@@ -34,13 +34,13 @@ bool long_form() {
     return value != nullptr && *value != '\0' && *value != '0';
 }
 
-/// The k to try, all or about kShortSweep of them: the first operations and the last, where names and states change,
+/// The k to try, all or about so many of them: the first operations and the last, where names and states change,
 /// and some between them, others for other seeds.
-std::set<std::int64_t> sweep(std::int64_t operations, test::Random& random) {
+std::set<std::int64_t> sweep(std::int64_t operations, test::Random& random, std::int64_t short_form = kShortSweep) {
     std::set<std::int64_t> chosen;
     for (std::int64_t k = 1; k <= operations; ++k)
         if (long_form() || k <= 2 || k > operations - 5) chosen.insert(k);
-    const auto wanted = static_cast<std::size_t>(std::min(operations, kShortSweep));
+    const auto wanted = static_cast<std::size_t>(std::min(operations, short_form));
     while (chosen.size() < wanted) chosen.insert(test::uniform(random, 1, static_cast<int>(operations)));
     return chosen;
 }
@@ -91,11 +91,13 @@ protected:
         build_.threads = 1;
         build_.quiet = true;
     }
+    std::int64_t short_sweep_ = kShortSweep;
     virtual void add_images() {}
     /// Of 0.02 m, so that textures end at two levels, four apart: deep districts, in two rows of them.
     void add_insets() {
+        short_sweep_ = 8;
         for (const auto& [name, y] : {std::pair("inset.tif", 76), std::pair("lower.tif", 230)}) {
-            write_picture(folder_.file(name), 300, 260, 77, y, 50, 0.02);
+            write_picture(folder_.file(name), 110, 90, 77, y, 50, 0.02);
             build_.images.push_back(folder_.file(name));
         }
     }
@@ -193,7 +195,7 @@ void BuildCrash::fault_at_any_operation() {
     Tally tally;
     tally.operations = operations;
     for (const FaultKind kind : kFaults)
-        for (const std::int64_t k : sweep(operations, random)) {
+        for (const std::int64_t k : sweep(operations, random, short_sweep_)) {
             const std::uint64_t seed = random();
             SCOPED_TRACE(
                 fmt::format("operation {} of {}, fault {}, disk seed {}", k, operations, static_cast<int>(kind), seed));
@@ -246,7 +248,7 @@ void BuildCrash::fault_while_taken_up() {
         EXPECT_GT(reused, 0);
         tally.operations = left;
         for (const FaultKind kind : kFaults)
-            for (const std::int64_t k : sweep(left, random)) {
+            for (const std::int64_t k : sweep(left, random, short_sweep_)) {
                 const std::uint64_t seed = random();
                 SCOPED_TRACE(fmt::format("operation {} of {}, fault {} after {}, disk seed {}", k, left,
                                          static_cast<int>(kind), static_cast<int>(first), seed));
@@ -360,7 +362,7 @@ class DeepUpdateCrash : public UpdateCrash {
 protected:
     void add_images() override { add_insets(); }
     void change_images() override {
-        write_picture(folder_.file("third.tif"), 260, 300, 33, 150, 90, 0.02);
+        write_picture(folder_.file("third.tif"), 90, 110, 33, 150, 90, 0.02);
         update_.images.push_back(folder_.file("third.tif"));
         update_.remove = {"inset.tif"};
     }
@@ -375,7 +377,7 @@ void UpdateCrash::fault_during_an_update() {
     tally.operations = operations;
     int found_new = 0;
     for (const FaultKind kind : kFaults)
-        for (const std::int64_t k : sweep(operations, random)) {
+        for (const std::int64_t k : sweep(operations, random, short_sweep_)) {
             const std::uint64_t seed = random();
             SCOPED_TRACE(
                 fmt::format("operation {} of {}, fault {}, disk seed {}", k, operations, static_cast<int>(kind), seed));
