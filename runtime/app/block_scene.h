@@ -24,7 +24,8 @@ public:
 
     /// Of the options: budget, tau, lod; the curvature, which may not be on. Errors: ErrorCode::usage for that; those
     /// of read_height_raster() and BlockWorld::make().
-    static Result<std::unique_ptr<BlockScene>> open(const TileStore& store, const SceneOptions& options);
+    static Result<std::unique_ptr<BlockScene>> open(const TileStore& store, const SceneOptions& options,
+                                                    const LoadProgress& progress = {});
 
     const Dataset& dataset() const { return dataset_; }
     const BlockWorld& world() const { return world_; }
