@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/process_usage.h"
+#include "common/progress.h"
 #include "common/report.h"
 #include "runtime/app/block_display.h"
 #include "runtime/app/block_page.h"
@@ -336,6 +337,15 @@ Result<void> write_audit(const BlockReport& report, BlockAuditFigures figures, B
     return folder->write({{"index.html", *page}, {"audit.json", json.dump(2) + "\n"}});
 }
 
+Result<std::unique_ptr<BlockScene>> open_scene(const TileStore& store, const ViewOptions& o) {
+    Progress progress("reading blocks", "%", false);
+    progress.set_total(100);
+    return BlockScene::open(store, scene_options(o), [&](double share) {
+        progress.update(100 * share);
+        return !interrupt_flag();
+    });
+}
+
 }  // namespace
 
 Result<void> refuse_with_blocks(bool given, const std::string& option) {
@@ -345,7 +355,7 @@ Result<void> refuse_with_blocks(bool given, const std::string& option) {
 }
 
 Result<void> shoot_blocks(const ViewOptions& o, const TileStore& store, const BlockShot& shot) {
-    auto scene = BlockScene::open(store, scene_options(o));
+    auto scene = open_scene(store, o);
     if (!scene) return scene.error();
     auto display = BlockDisplay::create(**scene, display_options(o));
     if (!display) return display.error();
@@ -372,7 +382,7 @@ Result<void> shoot_blocks(const ViewOptions& o, const TileStore& store, const Bl
 }
 
 Result<void> fly_blocks(const ViewOptions& o, const TileStore& store, const FlightPath& path, const BlockFlight& f) {
-    auto scene = BlockScene::open(store, scene_options(o));
+    auto scene = open_scene(store, o);
     if (!scene) return scene.error();
     DisplayOptions shown = display_options(o);
     shown.window = !f.headless;
@@ -403,7 +413,7 @@ Result<void> fly_blocks(const ViewOptions& o, const TileStore& store, const Flig
 
 Result<bool> audit_blocks(const ViewOptions& o, const TileStore& store, const FlightPath& path,
                           const BlockReport& report) {
-    auto scene = BlockScene::open(store, scene_options(o));
+    auto scene = open_scene(store, o);
     if (!scene) return scene.error();
     BlockAudit audit;
     audit.by_frame = !report.folder.empty();

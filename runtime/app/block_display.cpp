@@ -69,13 +69,20 @@ Result<std::unique_ptr<SurfaceRenderer>> make_renderer(const BlockScene& scene) 
 
 }  // namespace
 
-Result<std::unique_ptr<BlockDisplay>> BlockDisplay::create(const BlockScene& scene, const DisplayOptions& o) {
+Result<std::unique_ptr<GlContext>> BlockDisplay::make_context(const DisplayOptions& o) {
+    return o.window ? create_window_context({"Scree", o.width_px, o.height_px, o.wait_for_refresh, o.visible_window})
+                    : create_headless_context();
+}
+
+Result<std::unique_ptr<BlockDisplay>> BlockDisplay::create(const BlockScene& scene, const DisplayOptions& o,
+                                                           std::unique_ptr<GlContext> context) {
     std::unique_ptr<BlockDisplay> display(new BlockDisplay(scene));
-    auto context = o.window
-                       ? create_window_context({"Scree", o.width_px, o.height_px, o.wait_for_refresh, o.visible_window})
-                       : create_headless_context();
-    if (!context) return context.error();
-    display->context_ = std::move(*context);
+    if (!context) {
+        auto made = make_context(o);
+        if (!made) return made.error();
+        context = std::move(*made);
+    }
+    display->context_ = std::move(context);
     display->samples_ = o.samples;
     auto renderer = make_renderer(scene);
     if (!renderer) return renderer.error();

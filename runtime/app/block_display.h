@@ -13,7 +13,11 @@ namespace scree {
 class BlockDisplay {
 public:
     /// Size, window and samples of the options. `scene` outlives the display.
-    static Result<std::unique_ptr<BlockDisplay>> create(const BlockScene& scene, const DisplayOptions& options);
+    /// `context`: to draw with, else it makes its own.
+    static Result<std::unique_ptr<BlockDisplay>> create(const BlockScene& scene, const DisplayOptions& options,
+                                                        std::unique_ptr<GlContext> context = nullptr);
+    /// A context by the options, for create().
+    static Result<std::unique_ptr<GlContext>> make_context(const DisplayOptions& options);
 
     GlContext& context() { return *context_; }
     RenderTarget& target() { return *target_; }

@@ -10,10 +10,16 @@
 
 namespace scree {
 
-Result<std::unique_ptr<BlockScene>> BlockScene::open(const TileStore& store, const SceneOptions& options) {
-    auto raster = read_height_raster(store, options.budget_bytes, kBytesPerSample);
+Result<std::unique_ptr<BlockScene>> BlockScene::open(const TileStore& store, const SceneOptions& options,
+                                                     const LoadProgress& progress) {
+    // What is read and what is made of it take about as long.
+    const auto half = [&progress](int which) -> LoadProgress {
+        if (!progress) return {};
+        return [&progress, which](double share) { return progress(0.5 * (which + share)); };
+    };
+    auto raster = read_height_raster(store, options.budget_bytes, kBytesPerSample, half(0));
     if (!raster) return raster.error();
-    auto world = BlockWorld::make(*raster);
+    auto world = BlockWorld::make(*raster, {}, half(1));
     if (!world) return world.error();
     return std::unique_ptr<BlockScene>(new BlockScene(store.dataset(), options, std::move(*world)));
 }

@@ -24,7 +24,8 @@ public:
     static constexpr std::int64_t kBytesPerSample = BlockWorld::kBytesPerSample + 16 + 24 + 3;
 
     /// Of the options: budget, tau, lod, curvature. Errors: those of read_height_raster() and BlockWorld::make().
-    static Result<std::unique_ptr<BlockScene>> open(const TileStore& store, const SceneOptions& options);
+    static Result<std::unique_ptr<BlockScene>> open(const TileStore& store, const SceneOptions& options,
+                                                    const LoadProgress& progress = {});
 
     const Dataset& dataset() const { return dataset_; }
     const BlockWorld& world() const { return world_; }

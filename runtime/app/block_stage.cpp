@@ -1,8 +1,12 @@
 #include "runtime/app/block_stage.h"
 
+#define GLFW_INCLUDE_NONE
+#include <GLFW/glfw3.h>
 #include <fmt/format.h>
 
+#include "common/report.h"
 #include "runtime/app/hud_text.h"
+#include "runtime/app/loading_window.h"
 #include "runtime/app/stage_lines.h"
 
 namespace scree {
@@ -10,17 +14,27 @@ namespace {
 
 constexpr Rgba kAnew{255, 190, 60, 255}, kReused{120, 200, 255, 255};
 
+// The window is there at once, and says how far it has come.
+Result<std::unique_ptr<BlockScene>> load(const SqliteStore& store, const ViewOptions& o, GlContext& context) {
+    auto window = LoadingWindow::create(context, "reading heights");
+    if (!window) return window.error();
+    return BlockScene::open(store, scene_options(o),
+                            [&](double share) { return (*window)->show(share) && !interrupt_flag(); });
+}
+
 }  // namespace
 
 Result<std::unique_ptr<Stage>> BlockStage::create(const ViewOptions& o, std::shared_ptr<const SqliteStore> store) {
     std::unique_ptr<BlockStage> stage(new BlockStage(o, std::move(store)));
-    auto scene = BlockScene::open(*stage->store_, scene_options(o));
-    if (!scene) return scene.error();
-    stage->scene_ = std::move(*scene);
     DisplayOptions shown = display_options(o);
     shown.window = true;
     shown.wait_for_refresh = true;
-    auto display = BlockDisplay::create(*stage->scene_, shown);
+    auto context = BlockDisplay::make_context(shown);
+    if (!context) return context.error();
+    auto scene = load(*stage->store_, o, **context);
+    if (!scene) return scene.error();
+    stage->scene_ = std::move(*scene);
+    auto display = BlockDisplay::create(*stage->scene_, shown, std::move(*context));
     if (!display) return display.error();
     stage->display_ = std::move(*display);
     set_look(o, stage->display_->frame_settings());
@@ -90,7 +104,12 @@ Result<std::string> BlockStage::exaggerate(double factor) {
     if (!store) return stay(store.error());
     SceneOptions options = scene_options(options_);
     options.tau_px = scene_->tau_px();
-    auto scene = BlockScene::open(**store, options);
+    GLFWwindow* window = context().window();
+    auto scene = BlockScene::open(**store, options, [window](double share) {
+        glfwSetWindowTitle(window, fmt::format("Scree: reading heights, {:.0f} %", 100 * share).c_str());
+        return !interrupt_flag();
+    });
+    glfwSetWindowTitle(window, window_title(options_).c_str());
     if (!scene) return stay(scene.error());
     if (auto ok = display_->change_to(**scene); !ok) return ok.error();
     store_ = std::move(*store);

@@ -17,6 +17,7 @@ Result<void> view(const ViewerOptions& o) {
     if (!store) return store.error();
     auto stage = wants_blocks(o.view) ? BlockStage::create(o.view, std::move(*store))
                                       : PagedStage::create(o.view, std::move(*store));
+    if (!stage && stage.error().code == ErrorCode::interrupted && !interrupt_flag()) return {};  // closed meanwhile
     if (!stage) return stage.error();
     auto viewer = Viewer::create(o, **stage);
     if (!viewer) return viewer.error();

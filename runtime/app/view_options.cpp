@@ -4,6 +4,7 @@
 
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 
 #include "common/cli/arguments.h"
 #include "common/report.h"
@@ -119,6 +120,10 @@ Result<void> check_view_options(ViewOptions& o) {
 
 Result<std::unique_ptr<SqliteStore>> open_store(const ViewOptions& o) {
     return SqliteStore::open(o.store, {o.exaggeration});
+}
+
+std::string window_title(const ViewOptions& o) {
+    return fmt::format("Scree - {}", std::filesystem::path(o.store).stem().string());
 }
 
 DisplayOptions display_options(const ViewOptions& o) {

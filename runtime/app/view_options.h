@@ -48,6 +48,8 @@ Result<void> check_view_options(ViewOptions& options);
 /// The store, its heights as high as the options want them. Errors: those of SqliteStore.
 Result<std::unique_ptr<SqliteStore>> open_store(const ViewOptions& options);
 /// What the options say of the picture: its size, --msaa, --anisotropy.
+/// "Scree - alps", of the store's name.
+std::string window_title(const ViewOptions& options);
 DisplayOptions display_options(const ViewOptions& options);
 /// The same of every frame: --sun, --edge.
 void set_look(const ViewOptions& options, FrameSettings& settings);

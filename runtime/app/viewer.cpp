@@ -71,7 +71,7 @@ Viewer::Viewer(const ViewerOptions& options, Stage& stage, std::unique_ptr<LineR
       asked_store_(stage.store()),
       wanted_tau_px_(options.view.tau_px),
       sun_hour_(sun_hour_of(glm::dvec3(stage.settings().sun_direction))) {
-    glfwSetWindowTitle(window_, fmt::format("Scree - {}", name_).c_str());
+    glfwSetWindowTitle(window_, window_title(options.view).c_str());
     input_.leave_to([this](const glm::dvec2& at) { return hud_.takes_mouse_at(at); });
 }
 

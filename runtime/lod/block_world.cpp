@@ -77,7 +77,8 @@ BlockRules block_rules(const LodSettings& settings, double tau_px) {
 
 // ---- making ----
 
-Result<BlockWorld> BlockWorld::make(const HeightRaster& raster, const BlockWorldOptions& options) {
+Result<BlockWorld> BlockWorld::make(const HeightRaster& raster, const BlockWorldOptions& options,
+                                    const LoadProgress& progress) {
     assert(options.cells_log2 >= 1 && options.cells_log2 <= kMaxBlockCellsLog2);
     const std::int64_t stride = (1 << options.cells_log2) + 1;
     if (raster.columns < stride || raster.rows < stride)
@@ -111,8 +112,18 @@ Result<BlockWorld> BlockWorld::make(const HeightRaster& raster, const BlockWorld
         array->resize(blocks * world.order_size_);
     world.maxima_.resize(blocks * static_cast<std::size_t>(world.bisection_->levels() + 1));
     world.active_.resize(blocks * (vertices + 1));
-    for (int block = 0; block < world.block_count(); ++block) world.make_block(raster, block);
-    for (int block = 0; block < world.block_count(); ++block) world.bound_errors(block);
+    const auto goes_on = [&](int half, int block) {
+        return !progress || block % world.columns_ != 0 ||
+               progress(0.5 * (half + static_cast<double>(block) / static_cast<double>(blocks)));
+    };
+    for (int block = 0; block < world.block_count(); ++block) {
+        if (!goes_on(0, block)) return Error{ErrorCode::interrupted, "stopped"};
+        world.make_block(raster, block);
+    }
+    for (int block = 0; block < world.block_count(); ++block) {
+        if (!goes_on(1, block)) return Error{ErrorCode::interrupted, "stopped"};
+        world.bound_errors(block);
+    }
     world.make_groups();
     world.make_dikes();
     return world;

@@ -75,7 +75,8 @@ public:
     /// Crops to whole blocks from the north-west corner: dropped_columns() and dropped_rows() say by how much. Errors:
     /// ErrorCode::usage where not even one block fits, and for more than 2^31 samples; ErrorCode::input for a height
     /// that is no finite number.
-    static Result<BlockWorld> make(const HeightRaster& raster, const BlockWorldOptions& options = {});
+    static Result<BlockWorld> make(const HeightRaster& raster, const BlockWorldOptions& options = {},
+                                   const LoadProgress& progress = {});
 
     const BlockFrame& select(const Camera& camera, const BlockRules& rules);
 

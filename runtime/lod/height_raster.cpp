@@ -34,7 +34,7 @@ Result<void> check_shape(const Dataset& d, std::int64_t budget_bytes, std::int64
 }  // namespace
 
 Result<HeightRaster> read_height_raster(const TileStore& store, std::int64_t budget_bytes,
-                                        std::int64_t bytes_per_sample) {
+                                        std::int64_t bytes_per_sample, const LoadProgress& progress) {
     const Dataset& d = store.dataset();
     const Lattice& l = d.lattice;
     if (auto ok = check_shape(d, budget_bytes, bytes_per_sample); !ok) return ok.error();
@@ -43,7 +43,9 @@ Result<HeightRaster> read_height_raster(const TileStore& store, std::int64_t bud
     HeightRaster raster{l.cells_x + 1, l.cells_y + 1, l.origin_x_m, l.origin_y_m, l.spacing_m, {}};
     raster.z.resize(static_cast<std::size_t>(raster.columns * raster.rows));
     const std::int64_t m = l.tile_cells();
-    for (std::int64_t y = 0; y * m < l.cells_y; ++y)
+    for (std::int64_t y = 0; y * m < l.cells_y; ++y) {
+        if (progress && !progress(static_cast<double>(y * m) / static_cast<double>(l.cells_y)))
+            return Error{ErrorCode::interrupted, "stopped"};
         for (std::int64_t x = 0; x * m < l.cells_x; ++x) {
             auto tile = read_height_tile(**reader, d, {l.deepest_level, x, y});
             if (!tile) return tile.error();
@@ -52,6 +54,7 @@ Result<HeightRaster> read_height_raster(const TileStore& store, std::int64_t bud
                     raster.z[static_cast<std::size_t>((y * m + j) * raster.columns + x * m + i)] =
                         d.height_m(tile->samples[static_cast<std::size_t>(j * l.tile_samples() + i)]);
         }
+    }
     return raster;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "common/store/tile_store.h"
@@ -19,10 +20,14 @@ struct HeightRaster {
     double y_m(double j) const { return north_m - j * spacing_m; }
 };
 
+/// Told the share that is done, 0 to 1, ever so often; false: stop, which is ErrorCode::interrupted. Empty: nobody
+/// asks.
+using LoadProgress = std::function<bool(double share)>;
+
 /// Every sample of a store's deepest level. Errors: ErrorCode::usage where `bytes_per_sample` of them would not fit the
 /// budget, where cells are absent, and where the heights' depth varies by place: --cracks dike shows none of these;
 /// those of the store.
 Result<HeightRaster> read_height_raster(const TileStore& store, std::int64_t budget_bytes,
-                                        std::int64_t bytes_per_sample);
+                                        std::int64_t bytes_per_sample, const LoadProgress& progress = {});
 
 }  // namespace scree

@@ -115,6 +115,27 @@ std::string flaw(const BlockWorld& world, const std::vector<std::uint32_t>& indi
     return "";
 }
 
+// In order, from the beginning to near the end, and no further than is wished.
+TEST(BlockWorld, TellsHowFarItHasComeAndStopsWhenTold) {
+    HeightRaster flat{200, 300, 0, 0, 1, {}};
+    flat.z.assign(200 * 300, 0);
+    std::vector<double> shares;
+    ASSERT_TRUE(BlockWorld::make(flat, {}, [&](double share) {
+                    shares.push_back(share);
+                    return true;
+                }).ok());
+    ASSERT_EQ(shares.size(), 2u * 9u) << "a row of blocks each, twice";
+    EXPECT_EQ(shares.front(), 0);
+    EXPECT_GT(shares.back(), 0.9);
+    EXPECT_LT(shares.back(), 1);
+    EXPECT_TRUE(std::is_sorted(shares.begin(), shares.end()));
+    for (const double enough : {0.0, 0.7}) {
+        const auto stopped = BlockWorld::make(flat, {}, [&](double share) { return share < enough; });
+        ASSERT_FALSE(stopped.ok());
+        EXPECT_EQ(stopped.error().code, ErrorCode::interrupted);
+    }
+}
+
 TEST(BlockWorld, CompleteItDraws868562TrianglesOfThePapersScene) {
     SCREE_TRACE_SEED();
     Random random(test::seed());
