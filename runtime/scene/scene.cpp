@@ -43,7 +43,14 @@ constexpr double kStill_m = 1e-3;
 /// Grows whenever a tile comes, goes or turns out to be damaged.
 std::int64_t changes(const PagerCounters& c) { return c.tiles_paged_in + c.tiles_paged_out + c.damaged_tiles; }
 
-bool has_edge_field(const SceneOptions& options) { return options.soft_edge && options.textures; }
+// No more of the budget than a sixteenth goes to soft ends: coarser ones leave room for tiles.
+constexpr std::int64_t kEdgeShare = 16;
+
+// 0: none.
+std::int64_t edge_cells(const SceneOptions& options) {
+    if (!options.soft_edge || !options.textures) return 0;
+    return EdgeField::cells_in(options.budget_bytes / kEdgeShare, options.follow);
+}
 
 bool same_view(const Camera& a, const Camera& b) {
     return a.eye == b.eye && a.forward == b.forward && a.up == b.up && a.fov_deg == b.fov_deg &&
@@ -102,7 +109,8 @@ MoreMemory Scene::more_memory(const Dataset& dataset, const SceneOptions& option
     if (options.lod.method != LodMethod::geomip)
         more = {PageMesher::slot_cost(dataset), PageMesher::fixed_cost(dataset)};
     if (options.lod.metric == ErrorMetric::deboer) more.per_height_slot = Pager::corrections_cost();
-    if (has_edge_field(options)) more.fixed += EdgeField::bytes(dataset, options.follow);
+    if (const std::int64_t cells = edge_cells(options); cells > 0)
+        more.fixed += EdgeField::bytes(EdgeField::shape_of(dataset, cells), options.follow);
     return more;
 }
 
@@ -127,7 +135,8 @@ void Scene::make_mesher() {
 }
 
 void Scene::make_edge_field() {
-    if (has_edge_field(options_)) edge_field_ = EdgeField::read(*store_, edge_band_m(dataset().lattice));
+    if (const std::int64_t cells = edge_cells(options_); cells > 0)
+        edge_field_ = EdgeField::read(*store_, edge_band_m(dataset().lattice), cells);
 }
 
 // Thins what was selected, where the method does.
@@ -155,8 +164,8 @@ Result<void> Scene::start(TileSink& sink) {
 
 void Scene::begin_watch() {
     if (options_.follow)
-        watch_ = std::make_unique<StoreWatch>(
-            store_, StoreReading{std::max(options_.loader_threads, 1), has_edge_field(options_)});
+        watch_ = std::make_unique<StoreWatch>(store_,
+                                              StoreReading{std::max(options_.loader_threads, 1), edge_cells(options_)});
 }
 
 void Scene::tell(const std::string& message) const {

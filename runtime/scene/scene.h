@@ -34,8 +34,8 @@ struct SceneOptions {
     int loader_threads = 2;
     int latency_ms = 0;
     bool textures = true;
-    /// Keep an EdgeField, for ends that dissolve: 1.5 MB of the budget, 5 with `follow`, at most; open() reads some
-    /// textures. Not without textures.
+    /// Keep an EdgeField, for ends that dissolve: A sixteenth of the budget at most, and no more than 1.5 MB, 5 with
+    /// `follow`; open() reads some textures. Not without textures.
     bool soft_edge = true;
     bool follow = false;  ///< take up what updates make of the store; else a changed store is an error of complete()
     std::int64_t upload_bytes_per_frame = 4 << 20;  ///< about 90 textures; larger arrives sooner and may hitch

@@ -19,8 +19,9 @@ Result<OpenedStore> open_store(const std::string& path, const StoreOptions& opti
         if (!reader) return reader.error();
         opened.readers.push_back(std::move(*reader));
     }
-    if (reading.edge_field)
-        opened.edge_field = EdgeField::read(*opened.store, edge_band_m(opened.store->dataset().lattice));
+    if (reading.edge_cells > 0)
+        opened.edge_field =
+            EdgeField::read(*opened.store, edge_band_m(opened.store->dataset().lattice), reading.edge_cells);
     return opened;
 }
 

@@ -18,7 +18,7 @@ namespace scree {
 /// What is wanted of a store that is opened.
 struct StoreReading {
     int readers = 1;
-    bool edge_field = false;
+    std::int64_t edge_cells = 0;  ///< of an EdgeField at most; 0: none is wanted
 };
 
 /// A store as it was at one moment, with readers that were opened for it.

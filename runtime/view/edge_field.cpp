@@ -9,6 +9,9 @@ namespace scree {
 namespace {
 
 constexpr double kBandShare = 0.015;
+// A cell's: a byte of OpenGL and, here, one and a third of one for the levels; the same once more, and the distances or
+// sums that it is made with.
+constexpr std::int64_t kBytes = 3, kBytesOfTwo = 10;
 constexpr double kMostNarrow = 64;  // cells; only a raster ten times as long as it is wide has a band as wide
 
 // BC1: of the four colours of a block whose first endpoint is not the greater one, the last is transparent.
@@ -208,7 +211,7 @@ std::vector<std::uint8_t> without_narrow_absence(std::span<const std::uint8_t> p
     return wide;
 }
 
-EdgeField::Shape EdgeField::shape_of(const Lattice& l, int most_root_cells_log2) {
+EdgeField::Shape EdgeField::shape_of(const Lattice& l, int most_root_cells_log2, std::int64_t most_cells) {
     const int lattice_log2 = l.deepest_level + l.tile_cells_log2;
     Shape shape;
     for (int log2 = 0; log2 <= most_root_cells_log2; ++log2) {
@@ -217,21 +220,22 @@ EdgeField::Shape EdgeField::shape_of(const Lattice& l, int most_root_cells_log2)
             return static_cast<std::int64_t>(std::ceil(static_cast<double>(extent) / side));
         };
         const std::int64_t columns = cells(l.cells_x), rows = cells(l.cells_y);
-        if (log2 > 0 && columns * rows > kMostCells) break;
+        if (log2 > 0 && columns * rows > most_cells) break;
         shape = {log2, columns, rows, side};
     }
     return shape;
 }
 
-EdgeField::Shape EdgeField::shape_of(const Dataset& d) {
-    return shape_of(d.lattice, d.texture_size_log2 + d.texture_deepest_level);
+EdgeField::Shape EdgeField::shape_of(const Dataset& d, std::int64_t most_cells) {
+    return shape_of(d.lattice, d.texture_size_log2 + d.texture_deepest_level, most_cells);
 }
 
-// A byte of OpenGL and, here, one a cell and a third of one for the levels; the same once more, and the distances or
-// sums that it is made with.
-std::int64_t EdgeField::bytes(const Dataset& dataset, bool of_two) {
-    const Shape shape = shape_of(dataset);
-    return shape.columns * shape.rows * (of_two ? 10 : 3);
+std::int64_t EdgeField::bytes(const Shape& shape, bool of_two) {
+    return shape.columns * shape.rows * (of_two ? kBytesOfTwo : kBytes);
+}
+
+std::int64_t EdgeField::cells_in(std::int64_t bytes, bool of_two) {
+    return std::clamp<std::int64_t>(bytes / (of_two ? kBytesOfTwo : kBytes), 1, kMostCells);
 }
 
 EdgeField::EdgeField(const Shape& shape, std::span<const std::uint8_t> present, double band_cells)
@@ -249,11 +253,11 @@ EdgeField::EdgeField(const Shape& shape, std::span<const std::uint8_t> present, 
     make_levels();
 }
 
-std::shared_ptr<const EdgeField> EdgeField::read(const TileStore& store, double band_m) {
+std::shared_ptr<const EdgeField> EdgeField::read(const TileStore& store, double band_m, std::int64_t most_cells) {
     auto reader = store.open_reader();
     if (!reader) return nullptr;
     const Dataset& d = store.dataset();
-    const Shape shape = shape_of(d);
+    const Shape shape = shape_of(d, most_cells);
     const double band_cells = band_m / (shape.cell_side * d.lattice.spacing_m);
     const std::vector<std::uint8_t> present =
         without_narrow_absence(GroundReader(d, **reader, shape).read(), shape.columns,

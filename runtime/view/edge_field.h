@@ -40,11 +40,13 @@ public:
         std::int64_t columns = 0, rows = 0;
         double cell_side = 1;  ///< in finest cells of the lattice
     };
-    /// The finest that kMostCells and the textures allow.
-    static Shape shape_of(const Dataset& dataset);
-    static Shape shape_of(const Lattice& lattice, int most_root_cells_log2);
+    /// The finest that the textures and so many cells allow.
+    static Shape shape_of(const Dataset& dataset, std::int64_t most_cells);
+    static Shape shape_of(const Lattice& lattice, int most_root_cells_log2, std::int64_t most_cells = kMostCells);
     /// Of memory while it is used, here and in OpenGL; `of_two`: and while the next one is made beside it.
-    static std::int64_t bytes(const Dataset& dataset, bool of_two);
+    static std::int64_t bytes(const Shape& shape, bool of_two);
+    /// What so many bytes allow, 1 at least and kMostCells at most.
+    static std::int64_t cells_in(std::int64_t bytes, bool of_two);
 
     /// `present`: what has ground, columns x rows of the shape. The field is 0 wherever the ground may end, which is
     /// anywhere between the middles of a cell that is present and one that is not.
@@ -52,7 +54,7 @@ public:
     /// Of what has ground, as textures are drawn from afar. Voids narrower than the band are none: more would be hidden
     /// than is missing. A texture that is damaged or missing is stood in for by the one above it. Null where the store
     /// cannot be read at all.
-    static std::shared_ptr<const EdgeField> read(const TileStore& store, double band_m);
+    static std::shared_ptr<const EdgeField> read(const TileStore& store, double band_m, std::int64_t most_cells);
 
     /// Of a dataset that has ground in all of so many finest cells, and nowhere else.
     static std::shared_ptr<const EdgeField> of_box(const Lattice& lattice, std::int64_t cells_x, std::int64_t cells_y,

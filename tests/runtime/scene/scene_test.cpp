@@ -452,7 +452,7 @@ TEST_F(SceneOfHills, KeepsNoEdgeFieldThatNobodyWants) {
     EXPECT_NE(soft.scene->edge_field(), nullptr);
     EXPECT_EQ(hard.scene->edge_field(), nullptr);
     EXPECT_EQ(soft.scene->memory().resident_bytes - hard.scene->memory().resident_bytes,
-              EdgeField::bytes(soft.scene->dataset(), false));
+              EdgeField::bytes(soft.scene->edge_field()->shape(), false));
 }
 
 struct Flown {

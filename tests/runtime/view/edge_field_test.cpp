@@ -202,13 +202,13 @@ TEST(EdgeField, ReadsWhatHasGroundOfTheTexturesThereAre) {
                                       (static_cast<double>(16 * y + j) + 0.5) * texel);
                 });
             }
-    const EdgeField::Shape shape = EdgeField::shape_of(store.d);
+    const EdgeField::Shape shape = EdgeField::shape_of(store.d, EdgeField::kMostCells);
     EXPECT_EQ(shape.root_cells_log2, 7);
     EXPECT_EQ(shape.columns, 256);
     EXPECT_EQ(shape.rows, 128);
     EXPECT_EQ(shape.cell_side, 0.5);
     const double band_m = 10;
-    const auto field = EdgeField::read(store, band_m);
+    const auto field = EdgeField::read(store, band_m, EdgeField::kMostCells);
     ASSERT_NE(field, nullptr);
     for (std::int64_t y = 0; y < shape.rows; ++y)
         for (std::int64_t x = 0; x < shape.columns; ++x) {
@@ -224,7 +224,7 @@ TEST(EdgeField, ReadsWhatHasGroundOfTheTexturesThereAre) {
         }
     // Without any texture to read, only the box ends.
     store.tiles.clear();
-    const auto box = EdgeField::read(store, band_m);
+    const auto box = EdgeField::read(store, band_m, EdgeField::kMostCells);
     EXPECT_EQ(box->values()[static_cast<std::size_t>(64 * shape.columns + 200)], EdgeField::kFar);
     EXPECT_EQ(box->values()[0], 0);
 }
@@ -237,11 +237,16 @@ TEST(EdgeField, OfAWideDatasetHasNoMoreCellsThanItMay) {
         Dataset d;
         d.lattice = *lattice;
         d.texture_deepest_level = 20;
-        const auto shape = EdgeField::shape_of(d);
+        for (const bool of_two : {false, true})
+            for (const std::int64_t bytes : {std::int64_t{1} << 16, std::int64_t{1} << 20, std::int64_t{1} << 40}) {
+                const auto within = EdgeField::shape_of(d, EdgeField::cells_in(bytes, of_two));
+                EXPECT_LE(EdgeField::bytes(within, of_two), std::max<std::int64_t>(bytes, 64 * 10));
+            }
+        const auto shape = EdgeField::shape_of(d, EdgeField::kMostCells);
         EXPECT_LE(shape.columns * shape.rows, EdgeField::kMostCells);
         EXPECT_GE(static_cast<double>(shape.columns) * shape.cell_side, static_cast<double>(x));
         EXPECT_GE(static_cast<double>(shape.rows) * shape.cell_side, static_cast<double>(y));
-        EXPECT_LE(EdgeField::bytes(d, true), std::int64_t{6} << 20);
+        EXPECT_LE(EdgeField::bytes(shape, true), std::int64_t{6} << 20);
     }
 }
 
