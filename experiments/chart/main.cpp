@@ -1,14 +1,12 @@
 // scree_chart: a chart of columns of a CSV, for scripts.
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 
 #include <charconv>
-#include <exception>
 #include <fstream>
 #include <iterator>
 
-#include "common/report.h"
 #include "experiments/chart/table.h"
+#include "experiments/program.h"
 
 namespace {
 
@@ -84,23 +82,11 @@ int main_of(int argc, char** argv) {
     app.add_flag("--bars", o.bars, "Bars, not lines");
     app.add_flag("--log-x", o.log_x, "Logarithmic abscissa");
     app.add_flag("--log-y", o.log_y, "Logarithmic ordinate");
-    try {
-        app.parse(argc, argv);
-    } catch (const CLI::ParseError& e) {
-        return app.exit(e) == 0 ? 0 : 2;
-    }
+    if (const int code = parse_words(app, argc, argv); code >= 0) return code;
     if (auto ok = run(o); !ok) return report_error(kProgram, ok.error());
     return 0;
 }
 
 }  // namespace
 
-int main(int argc, char** argv) {
-    scree::guard_standard_descriptors();
-    try {
-        return scree::finish_output(kProgram, main_of(argc, argv));
-    } catch (const std::exception& error) {
-        scree::note("{}: {}\n", kProgram, error.what());
-    }
-    return 5;
-}
+int main(int argc, char** argv) { return scree::run_program(kProgram, argc, argv, main_of); }

@@ -2,14 +2,13 @@
 // theory has it.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
-#include <exception>
 #include <string>
 #include <vector>
 
 #include "common/report.h"
 #include "experiments/claims/claims.h"
+#include "experiments/program.h"
 
 namespace {
 
@@ -52,10 +51,7 @@ int run(const Options& o) {
     return all ? 0 : static_cast<int>(scree::ErrorCode::check_failed);
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-    scree::guard_standard_descriptors();
+int main_of(int argc, char** argv) {
     Options o;
     CLI::App app{"The claims of the papers that fail, as figures: CSV and SVG a claim, and claims.json.",
                  "scree_claims"};
@@ -64,15 +60,10 @@ int main(int argc, char** argv) {
     app.add_option("--seed", o.seed, "Of all that is drawn at random")->capture_default_str();
     app.add_flag("--quick", o.quick, "A twentieth of the samples");
     app.add_option("--claim", o.only, "Only these: C2, C3, ...");
-    try {
-        app.parse(argc, argv);
-    } catch (const CLI::ParseError& error) {
-        return app.exit(error) == 0 ? 0 : static_cast<int>(scree::ErrorCode::usage);
-    }
-    try {
-        return scree::finish_output("scree_claims", run(o));
-    } catch (const std::exception& error) {
-        scree::note("scree_claims: {}\n", error.what());
-    }
-    return static_cast<int>(scree::ErrorCode::io);
+    if (const int code = scree::parse_words(app, argc, argv); code >= 0) return code;
+    return run(o);
 }
+
+}  // namespace
+
+int main(int argc, char** argv) { return scree::run_program("scree_claims", argc, argv, main_of); }

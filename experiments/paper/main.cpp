@@ -1,13 +1,12 @@
 // scree_paper_tables: reproduces the tables of Ueng & Chuang over a store, with what they leave out: what a frame errs.
-#include <CLI/CLI.hpp>
 
 #include <algorithm>
-#include <exception>
 #include <filesystem>
 
 #include "common/report.h"
 #include "common/store/sqlite_store.h"
 #include "experiments/paper/report.h"
+#include "experiments/program.h"
 
 namespace {
 
@@ -71,23 +70,11 @@ int main_of(int argc, char** argv) {
     app.add_option("--frames", o.frames, "Of each flight; 0: 800, or 300 with --quick")->capture_default_str();
     app.add_option("--budget", o.budget, "Ceiling of memory for the raster")->capture_default_str();
     app.add_flag("--quick", o.quick, "Fewer rows and frames, each timed once");
-    try {
-        app.parse(argc, argv);
-    } catch (const CLI::ParseError& e) {
-        return app.exit(e) == 0 ? 0 : 2;
-    }
+    if (const int code = parse_words(app, argc, argv); code >= 0) return code;
     if (auto ok = run(o); !ok) return report_error(kProgram, ok.error());
     return 0;
 }
 
 }  // namespace
 
-int main(int argc, char** argv) {
-    scree::guard_standard_descriptors();
-    try {
-        return scree::finish_output(kProgram, main_of(argc, argv));
-    } catch (const std::exception& error) {
-        scree::note("{}: {}\n", kProgram, error.what());
-    }
-    return 5;
-}
+int main(int argc, char** argv) { return scree::run_program(kProgram, argc, argv, main_of); }

@@ -16,6 +16,10 @@
 
 namespace scree {
 
+/// Rounding of float positions and of their projections on screen (Scree lod, 5.2), at 800 px: what a promise that is
+/// audited is not blamed for.
+inline constexpr double kRoundingPx = 1e-3;
+
 class ErrorHistogram {
 public:
     void add(double px);

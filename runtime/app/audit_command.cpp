@@ -19,8 +19,6 @@
 namespace scree {
 namespace {
 
-// Rounding of float positions and of their projections on screen (Scree lod, 5.2), at 800 px.
-constexpr double kRoundingPx = 1e-3;
 /// In motion, the clock that tiles grow by: 30 frames a second.
 constexpr double kFrame_s = 1.0 / 30;
 

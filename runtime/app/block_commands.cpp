@@ -10,6 +10,7 @@
 #include "common/process_usage.h"
 #include "common/progress.h"
 #include "common/report.h"
+#include "runtime/app/audit.h"
 #include "runtime/app/block_display.h"
 #include "runtime/app/block_page.h"
 #include "runtime/app/block_scene.h"
@@ -25,9 +26,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 using Json = nlohmann::ordered_json;
-
-// Rounding of float positions and of their projections on screen (Scree lod, 5.2), at 800 px.
-constexpr double kRoundingPx = 1e-3;
 
 double share(std::int64_t part, std::int64_t whole) {
     return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0;

@@ -32,7 +32,8 @@ public:
     std::int64_t resident_bytes() const;
 
     double tau_px() const { return rules_.tau_px; }
-    void set_tau_px(double tau_px) { rules_.tau_px = tau_px; }
+    /// What is no length stands for 0.
+    void set_tau_px(double tau_px) { rules_.tau_px = tau_px > 0 ? tau_px : 0; }
     /// How far off the finest data what is drawn may be, pixels; none where nothing is promised.
     std::optional<double> promise_px() const;
 

@@ -23,11 +23,11 @@ Result<ReportFolder> report_folder(const std::string& name, bool force) {
 }
 
 struct CompareOptions {
-    int frames = 12, rounds = 3;
+    int frames = 6, rounds = 2;
     double step_m = 15;
     std::vector<double> tau_px = CaseList{}.tau_px;
     std::string report, csv;
-    bool force = false, quiet = false, recommended = false;
+    bool force = false, quiet = false, recommended = false, quick = false;
     Wish wish;
 };
 
@@ -78,6 +78,9 @@ Result<Comparison> measure(const ViewOptions& o, const CompareOptions& c) {
     setup.rounds = c.rounds;
     setup.quiet = c.quiet;
     setup.cases = cases_of(setup.store->dataset(), o, c);
+    if (!c.quiet)
+        note("compare: {} cases, {} poses, {} round{}; the time left is that of cases like those measured so far\n",
+             setup.cases.size(), setup.path.size(), setup.rounds, setup.rounds == 1 ? "" : "s");
     return run_comparison(setup);
 }
 
@@ -178,8 +181,15 @@ int run_compare(int argc, char** argv) {
     app.add_option("--max-error", c.wish.most_error_px, "Pixels that may be promised at most")
         ->capture_default_str()
         ->needs(recommended);
+    auto* quick = app.add_flag("--quick", c.quick, "3 poses, 1 round, tolerances 0.5, 1, 2 and 4: a first look");
+    for (const char* option : {"--frames", "--rounds", "--taus"}) quick->excludes(app.get_option(option));
     app.add_flag("--quiet", c.quiet, "No progress");
     if (const int code = parse_arguments(app, argc, argv); code >= 0) return code;
+    if (c.quick) {
+        c.frames = 3;
+        c.rounds = 1;
+        c.tau_px = {0.5, 1, 2, 4};
+    }
     auto ok = check_view_options(o);
     if (ok) ok = check(c, o);
     if (!ok) return report_error("scree-view compare", ok.error());

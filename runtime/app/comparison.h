@@ -75,6 +75,12 @@ struct HeightQuantum {
     double error_m = 0, nearest_m = 0, error_px = 0;
 };
 
+/// A coarser quantum, as finest heights rounded to it would be seen at the pictured poses: an upper figure of any view
+/// direction. The store itself is not built anew.
+struct CoarserQuantum {
+    double quantum_m = 0, max_px = 0, p99_px = 0, mean_px = 0;
+};
+
 struct Comparison {
     std::string store, renderer;
     int frames = 0, rounds = 0, width_px = 0, height_px = 0;
@@ -83,6 +89,7 @@ struct Comparison {
     std::vector<ComparedCase> cases;
     std::vector<SkippedCase> skipped;
     HeightQuantum quantum;
+    std::vector<CoarserQuantum> coarser_quanta;
     double reference_bound_px = 0;    ///< 0: the finest data was drawn everywhere
     double reference_texture_px = 0;  ///< pixels a texel covers in the reference of the texture sweep
     int picture_width_px = 0, picture_height_px = 0;

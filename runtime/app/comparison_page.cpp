@@ -12,43 +12,10 @@
 
 #include "runtime/app/comparison_table.h"
 #include "runtime/report/html.h"
+#include "runtime/report/plot.h"
 
 namespace scree {
 namespace {
-
-/// Beyond the style of all pages: colour is a family of methods.
-constexpr std::string_view kStyle = R"css(
-:root { --geomip: var(--blue); --rsg: var(--orange); --block: var(--green); }
-svg .front { fill: none; stroke: var(--ink); stroke-width: 9; stroke-opacity: .13; stroke-linejoin: round;
-  stroke-linecap: round; }
-svg .ring { fill: none; stroke: var(--ink); stroke-width: 1.5; }
-.curve { color: var(--geomip); }
-.curve.rsg { color: var(--rsg); }
-.curve.block { color: var(--block); }
-.curve path.line { fill: none; stroke: currentColor; stroke-width: 2; }
-.curve.loose path.line { stroke-dasharray: 5 4; }
-.curve .mark { fill: currentColor; stroke: var(--page); stroke-width: 1; }
-.curve.loose .mark { fill: var(--page); stroke: currentColor; stroke-width: 1.6; }
-.legend { display: flex; flex-direction: column; gap: .3rem; margin: 0; padding: 1.6rem 0 0; list-style: none;
-  font-size: .92rem; }
-.legend li { display: flex; align-items: center; gap: .4rem; cursor: default; }
-.legend svg { width: 34px; height: 16px; flex: none; }
-body[data-method] .curve { opacity: .15; }
-body[data-method] .curve.chosen { opacity: 1; }
-)css";
-
-// Pointing at a name in the legend leaves its curve alone in the charts.
-constexpr std::string_view kScript = R"js(
-for (const item of document.querySelectorAll('.legend [data-of]')) {
-  const mark = on => {
-    for (const curve of document.querySelectorAll('.curve'))
-      curve.classList.toggle('chosen', on && curve.dataset.of === item.dataset.of);
-    if (on) document.body.dataset.method = ''; else delete document.body.dataset.method;
-  };
-  item.addEventListener('pointerenter', () => mark(true));
-  item.addEventListener('pointerleave', () => mark(false));
-}
-)js";
 
 // What could not be measured is said to be without end.
 std::string number(double v) { return v >= kBeyondMeasure ? "&infin;" : short_number(v); }
@@ -58,25 +25,7 @@ struct Curve {
     std::string method;
     LodSettings lod;
     std::vector<std::size_t> cases;
-    int shape = 0;
 };
-
-// Colour is the family, a mark the variant; hollow and dashed: no promise.
-std::string_view family(const LodSettings& lod) {
-    switch (lod.method) {
-        case LodMethod::geomip:
-            return "geomip";
-        case LodMethod::rsg:
-            return "rsg";
-        case LodMethod::block_rsg:
-            return "block";
-    }
-    return "";
-}
-
-std::string classes(const Curve& curve) {
-    return fmt::format("curve {}{}", family(curve.lod), curve.lod.is_guaranteed() ? "" : " loose");
-}
 
 std::vector<Curve> curves_of(const Comparison& comparison) {
     std::vector<Curve> curves;
@@ -85,10 +34,7 @@ std::vector<Curve> curves_of(const Comparison& comparison) {
         if (c.sweep != Sweep::tolerance) continue;
         auto at = std::find_if(curves.begin(), curves.end(), [&](const Curve& v) { return v.method == c.method; });
         if (at == curves.end()) {
-            const auto variants = std::count_if(curves.begin(), curves.end(), [&](const Curve& v) {
-                return v.lod.method == c.lod.method && v.lod.is_guaranteed() == c.lod.is_guaranteed();
-            });
-            curves.push_back({c.method, c.lod, {}, static_cast<int>(variants)});
+            curves.push_back({c.method, c.lod, {}});
             at = curves.end() - 1;
         }
         at->cases.push_back(k);
@@ -100,142 +46,39 @@ std::vector<Curve> curves_of(const Comparison& comparison) {
     return curves;
 }
 
-std::string mark(double x, double y, int shape, const std::string& title) {
-    std::string path;
-    switch (shape % 5) {
-        case 0:
-            path = fmt::format("M{:.1f},{:.1f}m-4.5,0a4.5,4.5 0 1,0 9,0a4.5,4.5 0 1,0 -9,0z", x, y);
-            break;
-        case 1:
-            path = fmt::format("M{:.1f},{:.1f}m-4,-4h8v8h-8z", x, y);
-            break;
-        case 2:
-            path = fmt::format("M{:.1f},{:.1f}m0,-5.5l5.5,5.5l-5.5,5.5l-5.5,-5.5z", x, y);
-            break;
-        case 3:
-            path = fmt::format("M{:.1f},{:.1f}m0,-5.5l5.5,9.5h-11z", x, y);
-            break;
-        default:
-            path = fmt::format("M{:.1f},{:.1f}m0,5.5l5.5,-9.5h-11z", x, y);
-            break;
-    }
-    return fmt::format("<path class=\"mark\" d=\"{}\">{}</path>", path,
-                       title.empty() ? "" : fmt::format("<title>{}</title>", title));
-}
-
-/// Values of one axis, by their logarithm. What is not above 0 stands at the low end.
-class LogAxis {
-public:
-    void cover(double v) {
-        if (!(v > 0) || !(v < kBeyondMeasure)) return;
-        low_ = std::min(low_, v);
-        high_ = std::max(high_, v);
-    }
-    void settle(double from, double to) {
-        if (!(low_ <= high_)) low_ = high_ = 1;
-        if (high_ < 1.5 * low_) high_ *= 1.25, low_ /= 1.25;
-        low_ /= 1.15, high_ *= 1.15;
-        from_ = from, to_ = to;
-    }
-    double at(double v) const {
-        const double t = (std::log(std::clamp(v, low_, high_)) - std::log(low_)) / (std::log(high_) - std::log(low_));
-        return from_ + t * (to_ - from_);
-    }
-    /// 1, 2, 5 of each decade; only powers of ten where there are many.
-    std::vector<double> ticks() const {
-        std::vector<double> ticks;
-        const double decades = std::log10(high_ / low_);
-        for (int e = static_cast<int>(std::floor(std::log10(low_)));
-             e <= static_cast<int>(std::ceil(std::log10(high_))); ++e)
-            for (const double lead : {1.0, 2.0, 5.0}) {
-                const double v = lead * std::pow(10.0, e);
-                if (v < low_ || v > high_ || (decades > 3.5 && lead != 1)) continue;
-                ticks.push_back(v);
-            }
-        return ticks;
-    }
-
-private:
-    double low_ = std::numeric_limits<double>::infinity(), high_ = 0, from_ = 0, to_ = 1;
-};
-
-constexpr double kWidth = 560, kHeight = 390, kLeft = 66, kRight = 14, kTop = 10, kBottom = 48;
-
-std::string point_title(const ComparedCase& c, Cost cost, std::string_view unit) {
-    return fmt::format("{}, tau {:g} px: true error {} px, {} {}", escaped(c.what.method), c.what.tau_px,
-                       number(c.figures.true_max_px), number(cost_of(c, cost)), unit);
-}
-
+// A line a method, its marks the tolerances; dashed: no promise.
 std::string chart(const Comparison& comparison, const std::vector<Curve>& curves, Cost cost, std::string_view title,
-                  std::string_view label, std::string_view unit) {
-    LogAxis across, up;
-    for (const Curve& curve : curves)
-        for (const std::size_t k : curve.cases) {
-            across.cover(comparison.cases[k].figures.true_max_px);
-            up.cover(cost_of(comparison.cases[k], cost));
-        }
-    across.settle(kLeft, kWidth - kRight);
-    up.settle(kHeight - kBottom, kTop);
-    std::string svg = fmt::format(
-        "<figure><figcaption>{}</figcaption><svg viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{} against true "
-        "error, "
-        "a line a method\">\n",
-        title, kWidth, kHeight, label);
-    for (const double v : across.ticks())
-        svg += fmt::format(
-            "<line class=\"grid\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1}\" y2=\"{2}\"/><text x=\"{0:.1f}\" y=\"{3}\" "
-            "text-anchor=\"middle\">{4}</text>\n",
-            across.at(v), kTop, kHeight - kBottom, kHeight - kBottom + 17, tick_number(v));
-    for (const double v : up.ticks())
-        svg += fmt::format(
-            "<line class=\"grid\" x1=\"{0}\" x2=\"{1}\" y1=\"{2:.1f}\" y2=\"{2:.1f}\"/><text x=\"{3}\" y=\"{4:.1f}\" "
-            "text-anchor=\"end\">{5}</text>\n",
-            kLeft, kWidth - kRight, up.at(v), kLeft - 7, up.at(v) + 4, tick_number(v));
-    svg += fmt::format("<text x=\"{:.0f}\" y=\"{}\" text-anchor=\"middle\">greatest true error, pixels</text>\n",
-                       (kLeft + kWidth - kRight) / 2, kHeight - 8);
-    svg += fmt::format("<text transform=\"translate(13 {:.0f}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
-                       (kTop + kHeight - kBottom) / 2, label);
-    const auto place = [&](std::size_t k) {
-        return std::pair{across.at(comparison.cases[k].figures.true_max_px), up.at(cost_of(comparison.cases[k], cost))};
+                  std::string_view label) {
+    LineChart chart;
+    chart.title = title;
+    chart.x = {"greatest true error, pixels", true, {}};
+    chart.y = {std::string(label), true, {}};
+    const auto point = [&](std::size_t k) {
+        return std::pair{comparison.cases[k].figures.true_max_px, cost_of(comparison.cases[k], cost)};
     };
-    const auto line_through = [&](const std::vector<std::size_t>& cases) {
-        std::string d;
-        for (const std::size_t k : cases) {
-            const auto [x, y] = place(k);
-            d += fmt::format("{}{:.1f},{:.1f}", d.empty() ? "M" : "L", x, y);
-        }
-        return d;
-    };
-    const std::vector<std::size_t> front = pareto_front(comparison.cases, cost);
-    svg += fmt::format("<path class=\"front\" d=\"{}\"/>\n", line_through(front));
     for (const Curve& curve : curves) {
-        svg += fmt::format("<g class=\"{}\" data-of=\"{}\"><path class=\"line\" d=\"{}\"/>", classes(curve),
-                           escaped(curve.method), line_through(curve.cases));
-        for (const std::size_t k : curve.cases) {
-            const auto [x, y] = place(k);
-            svg += mark(x, y, curve.shape, point_title(comparison.cases[k], cost, unit));
-        }
-        svg += "</g>\n";
+        PlotSeries series;
+        series.name = curve.lod.is_guaranteed() ? curve.method : curve.method + " (no promise)";
+        for (const std::size_t k : curve.cases)
+            if (comparison.cases[k].figures.true_max_px < kBeyondMeasure) series.points.push_back(point(k));
+        series.dashed = !curve.lod.is_guaranteed();
+        chart.series.push_back(std::move(series));
     }
-    for (const std::size_t k : front) {
-        const auto [x, y] = place(k);
-        svg +=
-            fmt::format("<circle class=\"ring\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"8\" pointer-events=\"none\"/>\n", x, y);
-    }
-    return svg + "</svg></figure>\n";
+    return to_figure(chart);
 }
 
-std::string legend(const std::vector<Curve>& curves) {
-    std::string list = "<ul class=\"legend\">\n";
-    for (const Curve& curve : curves)
-        list += fmt::format(
-            "<li data-of=\"{0}\"><svg viewBox=\"0 0 34 16\" aria-hidden=\"true\"><g class=\"{1}\"><path class=\"line\" "
-            "d=\"M1,8H33\"/>{2}</g></svg>{0}{3}</li>\n",
-            escaped(curve.method), classes(curve), mark(17, 8, curve.shape, ""),
-            curve.lod.is_guaranteed() ? "" : " <span class=\"soft\">(no promise)</span>");
-    return list +
-           "<li><svg viewBox=\"0 0 34 16\" aria-hidden=\"true\"><path class=\"front\" d=\"M5,8H29\"/><circle "
-           "class=\"ring\" cx=\"17\" cy=\"8\" r=\"6\"/></svg>Pareto front</li>\n</ul>\n";
+std::string front_section(const Comparison& comparison) {
+    std::vector<std::vector<std::string>> rows;
+    for (const auto& [cost, name] :
+         {std::pair(Cost::triangles, "triangles"), std::pair(Cost::frame_ms, "selection and drawing"),
+          std::pair(Cost::lod_ms, "selection")}) {
+        std::string cases;
+        for (const std::size_t k : pareto_front(comparison.cases, cost))
+            cases += fmt::format("{}{} at {:g}", cases.empty() ? "" : ", ", escaped(comparison.cases[k].what.method),
+                                 comparison.cases[k].what.tau_px);
+        rows.push_back({name, cases.empty() ? "&ndash;" : cases});
+    }
+    return html_table({"by", "the Pareto front: no case with a promise is both truer and cheaper"}, rows, 2);
 }
 
 std::string cheapest_section(const Comparison& comparison) {
@@ -384,6 +227,17 @@ std::string settings_section(const Comparison& c) {
                               quantum_text(c.quantum));
 }
 
+std::string quanta_section(const Comparison& c) {
+    if (c.coarser_quanta.empty()) return {};
+    std::vector<std::vector<std::string>> rows;
+    for (const CoarserQuantum& q : c.coarser_quanta)
+        rows.push_back({number(q.quantum_m), number(q.max_px), number(q.p99_px), number(q.mean_px)});
+    return "<h2>Height quantum</h2>\n<p>What the finest heights in view, rounded to a coarser quantum as they are read "
+           "out, would be seen as at most. The store is as it was: a build with that quantum also has other tiles, and "
+           "its file is smaller. These errors come on top of the promise.</p>\n" +
+           html_table({"quantum, m", "max, px", "p99, px", "mean, px"}, rows, 0);
+}
+
 std::string how_section(const Comparison& c) {
     std::string html = fmt::format(
         "<h2>How it was measured</h2>\n<ul>\n"
@@ -400,7 +254,7 @@ std::string how_section(const Comparison& c) {
         "<li><b>Promised</b>: the bound that holds from everywhere: tau (and s), or what the budget allowed.</li>\n"
         "<li><b>PSNR</b> over sRGB bytes, <b>SSIM</b> over luma (Wang et al. 2004), against pictures of tolerance 0{}; "
         "for the "
-        "textures' table also texels of {:g} px. 100 dB: the same picture.</li>\n</ul>\n",
+        "textures' table also texels of {:g} px, for dikes untextured blocks. 100 dB: the same picture.</li>\n</ul>\n",
         c.frames, c.step_m, c.rounds,
         c.reference_bound_px > 0
             ? fmt::format(" as far as memory allowed ({} px at most)", number(c.reference_bound_px))
@@ -441,23 +295,21 @@ Result<std::string> comparison_page(const Comparison& c, const std::optional<Wis
         fmt::format("{} cases, {} poses, {} x {} pixels, drawn by {}. Times are of this machine; triangles and errors "
                     "are not.",
                     c.cases.size(), c.frames, c.width_px, c.height_px, escaped(c.renderer)));
-    page.style(kStyle);
-    page.script(kScript);
     page.add(verdict(c, wish, command));
     page.add(cheapest_section(c));
     page.section("Cost against true error",
                  "A line a method, a mark a tolerance; further left is truer, further down is cheaper. Both axes are "
-                 "logarithmic. Ringed: no method with a promise is both truer and cheaper (the Pareto front). Hollow "
-                 "and dashed: no promise.");
+                 "logarithmic. Dashed: no promise.");
     page.add("<div class=\"charts\">\n");
-    page.add(chart(c, curves, Cost::triangles, "Triangles", "triangles a frame, mean", "triangles"));
-    page.add(chart(c, curves, Cost::frame_ms, "Selection and drawing", "frame, milliseconds", "ms"));
-    page.add(chart(c, curves, Cost::lod_ms, "Selection alone", "LOD, CPU milliseconds", "ms"));
-    page.add(legend(curves) + "</div>\n" + *pictures);
+    page.add(chart(c, curves, Cost::triangles, "Triangles", "triangles a frame, mean"));
+    page.add(chart(c, curves, Cost::frame_ms, "Selection and drawing", "frame, milliseconds"));
+    page.add(chart(c, curves, Cost::lod_ms, "Selection alone", "LOD, CPU milliseconds"));
+    page.add("</div>\n" + front_section(c) + *pictures);
     page.section("Texture tolerance", "Against full resolution in heights and textures.");
     page.add(sweep_table(c, Sweep::texture));
     page.section("Memory budget", "Where the budget binds, the tolerance rises.");
     page.add(sweep_table(c, Sweep::budget));
+    page.add(quanta_section(c));
     page.add(settings_section(c));
     page.section("All methods and tolerances");
     page.add(all_cases(c, curves));

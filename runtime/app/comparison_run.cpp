@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
@@ -14,17 +15,19 @@
 #include "common/progress.h"
 #include "common/report.h"
 #include "runtime/app/audit.h"
+#include "runtime/app/block_display.h"
+#include "runtime/app/block_scene.h"
 #include "runtime/app/coverage.h"
 #include "runtime/app/display.h"
 #include "runtime/app/image_difference.h"
+#include "runtime/lod/block_truth.h"
 #include "runtime/report/statistics.h"
 #include "runtime/view/camera.h"
+#include "runtime/view/frustum.h"
 
 namespace scree {
 namespace {
 
-// Rounding of float positions and of their projections on screen (Scree lod, 5.2), at 800 px.
-constexpr double kRoundingPx = 1e-3;
 /// Frames from each pose on: after a leap, and two of an eye that moves on.
 constexpr int kGlide = 3;
 /// Poses whose pictures are compared: each is kept, 1.9 MB at 800 x 800.
@@ -34,6 +37,7 @@ constexpr std::int64_t kReferenceBudget_bytes = std::int64_t{1} << 30;
 constexpr double kReferenceTexture_px = 0.25;
 /// About how much longer a frame takes that is judged: for the time left.
 constexpr double kJudging = 3;
+constexpr int kQuanta = 6;
 constexpr int kPictureWidth = 480, kPictureHeight = 320;
 
 using Picture = std::vector<std::uint8_t>;
@@ -45,16 +49,40 @@ bool same_scene(const ComparisonCase& a, const ComparisonCase& b) {
     return a.lod == b.lod && a.morph == b.morph && a.budget_bytes == b.budget_bytes;
 }
 
-/// A scene and what it is drawn with. One at a time: each takes the whole budget.
+/// A frame that is settled: of a scene, or of blocks.
+struct Settled {
+    SceneFrame frame;
+    double select_ms = 0;
+    bool paged_in = false;  ///< or not chosen at all: its time says nothing
+};
+
+bool has_blocks(const ComparisonCase& c) { return c.lod.cracks == CrackFix::dike; }
+
+/// A scene, or blocks, and what it is drawn with. One at a time: each takes the whole budget.
 struct Rig {
     std::unique_ptr<Display> display;
     std::unique_ptr<Scene> scene;  // its threads end first
+    std::unique_ptr<BlockScene> blocks;
+    std::unique_ptr<BlockDisplay> block_display;
+
+    static Result<Rig> open_blocks(const ComparisonSetup& setup, const SceneOptions& options) {
+        Rig rig;
+        auto blocks = BlockScene::open(*setup.store, options);
+        if (!blocks) return blocks.error();
+        rig.blocks = std::move(*blocks);
+        auto display = BlockDisplay::create(*rig.blocks, DisplayOptions{setup.width_px, setup.height_px});
+        if (!display) return display.error();
+        rig.block_display = std::move(*display);
+        rig.block_display->frame_settings().wait_until_drawn = true;
+        return rig;
+    }
 
     static Result<Rig> open(const ComparisonSetup& setup, const ComparisonCase& c) {
         SceneOptions options = setup.scene;
         options.lod = c.lod;
         options.morph = c.morph;
         options.budget_bytes = c.budget_bytes;
+        if (has_blocks(c)) return open_blocks(setup, options);
         auto scene = Scene::open(setup.store, options);
         if (!scene) return scene.error();
         DisplayOptions display_options{setup.width_px, setup.height_px};
@@ -63,19 +91,26 @@ struct Rig {
         if (!display) return display.error();
         (*display)->frame_settings().wait_until_drawn = true;
         if (auto ok = (*scene)->start(**display); !ok) return ok.error();
-        return Rig{std::move(*display), std::move(*scene)};
+        return Rig{std::move(*display), std::move(*scene), {}, {}};
     }
     void use(const ComparisonCase& c) {
+        if (blocks) return blocks->set_tau_px(c.tau_px);
         scene->options().tau_px = c.tau_px;
         scene->options().texture_tau_px = c.texture_tau_px;
     }
-    Result<SceneFrame> settle(const Camera& camera) { return scene->complete({&camera, 1}, interrupted); }
+    Result<Settled> settle(const Camera& camera) {
+        if (blocks) return Settled{{}, blocks->select(camera).lod_ms, false};
+        auto frame = scene->complete({&camera, 1}, interrupted);
+        if (!frame) return frame.error();
+        return Settled{*frame, frame->select_ms, frame->uploads > 0 || frame->reused};
+    }
     double draw_ms(const Camera& camera, const SceneFrame& frame) {
+        if (blocks) return block_display->draw(camera).finished_ms;
         return display->draw(camera, frame.selection->to_render(0), frame.half_curvature).finished_ms;
     }
     Picture picture(const Camera& camera, const SceneFrame& frame) {
         draw_ms(camera, frame);
-        return display->target().read_pixels();
+        return (blocks ? block_display->target() : display->target()).read_pixels();
     }
 };
 
@@ -91,6 +126,7 @@ struct CaseLog {
     std::vector<FrameTime> cold, lod, draw;  // a pose; each frame after the leap; the last of them
     Series triangles;
     ErrorHistogram errors;
+    BlockTruth block_errors;  // of blocks, in place of those
     double squared_difference = 0, ssim = 0;
     int pictures = 0;
     std::int64_t timed = 0, paged_in = 0;
@@ -176,28 +212,75 @@ private:
         }
     }
 
-    // Full-resolution pictures, one set for each size of texels that is compared with.
+    /// What pictures are compared with: those of blocks, or of tiles whose texels cover so many pixels.
+    using Look = std::pair<bool, double>;
+    static Look look_of(const ComparisonCase& c) {
+        return has_blocks(c) ? Look{true, 0} : Look{false, reference_texture_px(c)};
+    }
+
+    // Full-resolution pictures, one set for each look.
     Result<void> draw_references() {
         ComparisonCase finest;
         finest.tau_px = 0;
         for (const ComparisonCase& c : setup_.cases)
             finest.budget_bytes = std::max({finest.budget_bytes, c.budget_bytes, kReferenceBudget_bytes});
-        auto rig = Rig::open(setup_, finest);
-        if (!rig) return rig.error();
-        result_.renderer = rig->display->context().renderer();
-        for (const ComparisonCase& c : setup_.cases) {
-            finest.texture_tau_px = reference_texture_px(c);
-            if (references_.count(finest.texture_tau_px) != 0) continue;
-            rig->use(finest);
-            std::vector<Picture>& pictures = references_[finest.texture_tau_px];
-            for (const std::size_t pose : pictured_) {
-                auto frame = rig->settle(judged_camera(pose));
-                if (!frame) return frame.error();
-                pictures.push_back(rig->picture(judged_camera(pose), *frame));
-                result_.reference_bound_px = std::max(result_.reference_bound_px, frame->selection->max_bound_px);
-            }
+        for (const bool blocks : {false, true}) {
+            finest.lod = LodSettings{};
+            if (blocks)
+                finest.lod = LodSettings{LodMethod::rsg, ErrorMetric::guaranteed, ReuseTest::off, 0,
+                                         Culling::box,   CrackFix::dike};
+            if (std::none_of(setup_.cases.begin(), setup_.cases.end(),
+                             [&](const ComparisonCase& c) { return has_blocks(c) == blocks; }) &&
+                blocks)
+                continue;
+            auto rig = Rig::open(setup_, finest);
+            // Where blocks cannot be had none of their cases is measured either.
+            if (!rig && blocks && rig.error().code == ErrorCode::usage) continue;
+            if (!rig) return rig.error();
+            if (!blocks) result_.renderer = rig->display->context().renderer();
+            for (const ComparisonCase& c : setup_.cases)
+                if (has_blocks(c) == blocks)
+                    if (auto ok = draw_reference(*rig, finest, look_of(c)); !ok) return ok;
         }
         return {};
+    }
+
+    Result<void> draw_reference(Rig& rig, ComparisonCase& finest, const Look& look) {
+        if (references_.count(look) != 0) return {};
+        finest.texture_tau_px = look.second;
+        rig.use(finest);
+        std::vector<Picture>& pictures = references_[look];
+        for (const std::size_t pose : pictured_) {
+            auto settled = rig.settle(judged_camera(pose));
+            if (!settled) return settled.error();
+            pictures.push_back(rig.picture(judged_camera(pose), settled->frame));
+            if (rig.blocks) continue;
+            if (references_.size() == 1) note_quanta(rig, judged_camera(pose), settled->frame);
+            result_.reference_bound_px = std::max(result_.reference_bound_px, settled->frame.selection->max_bound_px);
+        }
+        return {};
+    }
+
+    // What coarser quanta would be seen as: the finest heights in view, rounded as they are read out.
+    void note_quanta(Rig& rig, const Camera& eye, const SceneFrame& frame) {
+        const Dataset& d = setup_.store->dataset();
+        const DrawnMesh mesh = drawn_mesh(d, patterns_, frame.selection->draws[0], *rig.display->arena(), nullptr);
+        const Frustum frustum(eye);
+        const double scale_px = eye.focal_px() * eye.off_axis_factor();
+        for (const LatticeVertex& v : mesh.corners) {
+            const double n = static_cast<double>(v.n);
+            glm::dvec3 point{d.lattice.x_m(v.i), d.lattice.y_m(v.j), d.height_offset_m + d.height_quantum_m * n};
+            const glm::dvec3 to = point - eye.eye;
+            const double h2 = to.x * to.x + to.y * to.y;
+            point.z -= h2 * frame.half_curvature;
+            if (!frustum.contains(point)) continue;
+            const double px_per_m = scale_px * std::sqrt(h2) / (h2 + (point.z - eye.eye.z) * (point.z - eye.eye.z));
+            for (int k = 0; k < kQuanta; ++k) {
+                const double step_n = std::ldexp(1, k + 1);
+                const double error_m = std::abs(std::nearbyint(n / step_n) * step_n - n) * d.height_quantum_m;
+                quanta_[static_cast<std::size_t>(k)].add(error_m * px_per_m);
+            }
+        }
     }
     static double reference_texture_px(const ComparisonCase& c) {
         return c.sweep == Sweep::texture ? std::min(kReferenceTexture_px, c.texture_tau_px) : c.texture_tau_px;
@@ -236,7 +319,7 @@ private:
                 auto frame = rig.settle(camera(pose, j));
                 if (!frame) return frame.error();
                 if (judged && j == kGlide - 1)
-                    if (auto ok = judge(rig, at, pose, *frame); !ok) return ok;
+                    if (auto ok = judge(rig, at, pose, frame->frame); !ok) return ok;
                 progress_.add(judged ? kJudging : 1);
             }
         return {};
@@ -252,7 +335,7 @@ private:
             for (int j = 0; j < kGlide; ++j) {
                 auto frame = rig.settle(camera(pose, j));
                 if (!frame) return frame.error();
-                const bool paged_in = frame->uploads > 0 || frame->reused;
+                const bool paged_in = frame->paged_in;
                 progress_.add(1);
                 if (j == 0) {
                     log.cold[pose].add(frame->select_ms, paged_in);
@@ -260,9 +343,9 @@ private:
                 }
                 log.lod[pose * (kGlide - 1) + static_cast<std::size_t>(j - 1)].add(frame->select_ms, paged_in);
                 if (j + 1 < kGlide) continue;
-                log.draw[pose].add(rig.draw_ms(camera(pose, j), *frame), paged_in);
+                log.draw[pose].add(rig.draw_ms(camera(pose, j), frame->frame), paged_in);
                 ++log.timed;
-                log.paged_in += frame->uploads > 0 ? 1 : 0;
+                log.paged_in += frame->frame.uploads > 0 ? 1 : 0;
             }
         return {};
     }
@@ -270,9 +353,12 @@ private:
     Result<void> judge(Rig& rig, std::size_t at, std::size_t pose, const SceneFrame& frame) {
         CaseLog& log = logs_[at];
         const Camera& eye = judged_camera(pose);
-        const Selection& s = *frame.selection;
-        note_selection(log, s, rig.scene->memory());
-        if (auto ok = note_surface(rig, at, eye, frame); !ok) return ok;
+        if (rig.blocks) {
+            note_blocks(rig, at, eye);
+        } else {
+            note_selection(log, *frame.selection, rig.scene->memory());
+            if (auto ok = note_surface(rig, at, eye, frame); !ok) return ok;
+        }
         if (const auto found = std::find(pictured_.begin(), pictured_.end(), pose); found != pictured_.end())
             note_picture(at, static_cast<std::size_t>(found - pictured_.begin()), rig.picture(eye, frame));
         return {};
@@ -318,6 +404,26 @@ private:
         return {};
     }
 
+    void note_blocks(Rig& rig, std::size_t at, const Camera& eye) {
+        BlockScene& blocks = *rig.blocks;
+        CaseLog& log = logs_[at];
+        CaseFigures& f = log.figures;
+        const BlockFrame& frame = blocks.select(eye);
+        log.triangles.add(static_cast<double>(frame.triangles()));
+        f.resident_bytes = f.tile_bytes = blocks.resident_bytes();
+        const double promised_px = blocks.promise_px().value_or(0);
+        f.bound_px = std::max(f.bound_px, promised_px);
+        judge_frame(blocks.world(), eye, frame, promised_px + kRoundingPx, log.block_errors, blocks.half_curvature());
+        const CrackReport cracks = blocks.count_cracks();
+        f.open_edges += cracks.open_edges;
+        f.t_junctions += cracks.t_junctions;
+        f.holes += blocks.count_holes(eye);
+        if (blocks.promise_px())
+            f.kept = std::max(log.block_errors.blocks.max_px(), log.block_errors.dikes.max_px()) <=
+                         promised_px + kRoundingPx &&
+                     f.holes == 0 && f.open_edges == 0 && f.t_junctions == 0;
+    }
+
     void note_nearest(const DrawnMesh& mesh, const Camera& eye) {
         const Dataset& d = setup_.store->dataset();
         double nearest2 = std::numeric_limits<double>::infinity();
@@ -332,7 +438,7 @@ private:
 
     void note_picture(std::size_t at, std::size_t number, const Picture& picture) {
         CaseLog& log = logs_[at];
-        const Picture& reference = references_[reference_texture_px(setup_.cases[at])][number];
+        const Picture& reference = references_[look_of(setup_.cases[at])][number];
         const double squared = mean_squared_difference(picture, reference);
         const double similar = ssim(setup_.width_px, setup_.height_px, picture, reference);
         log.squared_difference += squared;
@@ -404,6 +510,12 @@ private:
         f.true_max_px = log.errors.max();
         f.true_p99_px = log.errors.quantile(0.99);
         f.true_mean_px = log.errors.mean();
+        if (const BlockTruth& t = log.block_errors; t.blocks.count() > 0) {
+            f.samples = t.blocks.count();
+            f.true_max_px = std::max(t.blocks.max_px(), t.dikes.max_px());
+            f.true_p99_px = t.blocks.quantile_px(0.99);
+            f.true_mean_px = t.blocks.mean_px();
+        }
         f.psnr_db = psnr_db(log.squared_difference / std::max(log.pictures, 1));
         f.ssim = log.ssim / std::max(log.pictures, 1);
         return f;
@@ -421,9 +533,15 @@ private:
         r.reference_texture_px = kReferenceTexture_px;
         r.picture_width_px = std::min(setup_.width_px, kPictureWidth);
         r.picture_height_px = std::min(setup_.height_px, kPictureHeight);
-        for (const auto& [texture_px, pictures] : references_)
-            if (texture_px != kReferenceTexture_px || references_.size() == 1)
+        for (const auto& [look, pictures] : references_)
+            if (!look.first && (look.second != kReferenceTexture_px || r.reference_picture.empty()))
                 r.reference_picture = middle_of(pictures[shown_]);
+        for (int k = 0; k < kQuanta; ++k) {
+            const ErrorHistogram& seen = quanta_[static_cast<std::size_t>(k)];
+            if (seen.count() > 0)
+                r.coarser_quanta.push_back(
+                    {std::ldexp(d.height_quantum_m, k + 1), seen.max(), seen.quantile(0.99), seen.mean()});
+        }
         const Camera& any = cameras_.front();
         const double nearest_m = std::max(nearest_m_, any.near_m);
         r.quantum = {d.height_quantum_error_m, nearest_m,
@@ -439,7 +557,8 @@ private:
     std::vector<RigCases> rigs_;
     std::vector<CaseLog> logs_;
     std::map<std::size_t, std::string> refusals_;
-    std::map<double, std::vector<Picture>> references_;  // by pixels a texel may cover
+    std::map<Look, std::vector<Picture>> references_;
+    std::array<ErrorHistogram, kQuanta> quanta_;  // twice the store's, four times ..
     double nearest_m_ = std::numeric_limits<double>::infinity();
     Progress progress_;
     Comparison result_;

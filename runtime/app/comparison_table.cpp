@@ -99,6 +99,16 @@ Json front_report(const Comparison& comparison) {
         {"triangles", front(Cost::triangles)}, {"lod_ms", front(Cost::lod_ms)}, {"frame_ms", front(Cost::frame_ms)}};
 }
 
+Json quanta_report(const Comparison& comparison) {
+    Json rows = Json::array();
+    for (const CoarserQuantum& q : comparison.coarser_quanta)
+        rows.push_back({{"quantum_m", q.quantum_m},
+                        {"max_px", finite(q.max_px)},
+                        {"p99_px", finite(q.p99_px)},
+                        {"mean_px", finite(q.mean_px)}});
+    return rows;
+}
+
 Json skipped_report(const Comparison& comparison) {
     Json rows = Json::array();
     for (const SkippedCase& s : comparison.skipped)
@@ -136,7 +146,8 @@ nlohmann::ordered_json comparison_json(const Comparison& c, const std::optional<
         {"height_quantum",
          {{"error_m", c.quantum.error_m},
           {"nearest_m", finite(c.quantum.nearest_m)},
-          {"error_px", finite(c.quantum.error_px)}}},
+          {"error_px", finite(c.quantum.error_px)},
+          {"coarser", quanta_report(c)}}},
         {"cases", Json::array()},
         {"pareto", front_report(c)},
         {"cheapest", cheapest_report(c)},

@@ -11,6 +11,19 @@ constexpr int opposite(int side) { return (side + 2) % 4; }
 
 bool has(ConstTileBorder side, int k) { return (side[k / 64] >> (k % 64) & 1) != 0; }
 
+// Every 2^log2-th bit, closed up.
+std::uint64_t every(std::uint64_t bits, int log2) {
+    for (; log2 > 0; --log2) {
+        bits &= 0x5555555555555555u;
+        bits = (bits | bits >> 1) & 0x3333333333333333u;
+        bits = (bits | bits >> 2) & 0x0f0f0f0f0f0f0f0fu;
+        bits = (bits | bits >> 4) & 0x00ff00ff00ff00ffu;
+        bits = (bits | bits >> 8) & 0x0000ffff0000ffffu;
+        bits = (bits | bits >> 16) & 0x00000000ffffffffu;
+    }
+    return bits;
+}
+
 std::size_t words_of_side(int cells) { return (static_cast<std::size_t>(cells) + 64) / 64; }
 
 }  // namespace
@@ -115,6 +128,17 @@ void EdgeAgreement::exchange(const Link& l) {
         else
             add(l.fine, l.side, a);
     };
+    if (!l.same_size && words_ == 1) {
+        const std::uint64_t all = l.count < 64 ? (std::uint64_t{1} << l.count) - 1 : ~std::uint64_t{0};
+        const std::uint64_t a = every(fine[0], std::countr_zero(static_cast<unsigned>(l.fine_step))),
+                            b = every(coarse[0] >> l.coarse_first,
+                                      std::countr_zero(static_cast<unsigned>(l.coarse_step)));
+        for (std::uint64_t apart = (a ^ b) & all; apart != 0; apart &= apart - 1) {
+            const int k = std::countr_zero(apart);
+            share(k * l.fine_step, l.coarse_first + k * l.coarse_step);
+        }
+        return;
+    }
     if (!l.same_size) {
         for (int k = 0; k < l.count; ++k) share(k * l.fine_step, l.coarse_first + k * l.coarse_step);
         return;

@@ -15,6 +15,7 @@
 #include "runtime/lod/reuse.h"
 #include "runtime/lod/tile_vertices.h"
 #include "runtime/lod/triangle_walk.h"
+#include "runtime/lod/vertex_metric.h"
 
 namespace scree {
 namespace {
@@ -30,9 +31,9 @@ constexpr double kCoarsening = 1.0905077326652577;
 constexpr int kMostCoarsening = 16;  ///< two octaves: about a quarter of the triangles
 /// Eyes kept of a tile's last choice; with more views nothing is reused.
 constexpr std::size_t kMostEyes = 4;
-/// A height slot's share in the pool, of the 3 * 2 * m^2 indices of a tile with nothing dropped: what a quarter of them
+/// A height slot's share in the pool, of the 3 * 2 * m^2 indices of a tile with nothing dropped: what a sixth of them
 /// comes to where half of the slots are drawn. So many tiles have room for all.
-constexpr std::size_t kPoolShare = 8, kRoomyTiles = 64;
+constexpr std::size_t kPoolShare = 12, kRoomyTiles = 64;
 
 // Where the vertices of a mesh were chosen for.
 struct Chosen {
@@ -69,7 +70,7 @@ struct PageMesher::Impl {
           lod(settings),
           n(d.lattice.tile_cells_log2),
           m(1 << n),
-          vertices(d, height_slots),
+          vertices(d, height_slots, settings.method == LodMethod::block_rsg),
           edges(d.lattice),
           walks{TriangleWalk(vertices.bisection({0, 0, 0})), TriangleWalk(vertices.bisection({0, 1, 0}))},
           states(static_cast<std::size_t>(height_slots)),
@@ -96,6 +97,7 @@ struct PageMesher::Impl {
     MeshPool& pool;
     std::vector<std::uint32_t> buffer;
     MeshCounters counters;
+    std::array<double, kMaxViews> scale_px{};      ///< of the frame, by view: f K
     std::span<const DrawnTile> tiles;              ///< of the frame
     const Residency* residency = nullptr;          ///< of the frame
     std::vector<std::int32_t> part_level_of_slot;  ///< the finest part that a tile is drawn in; empty: all are whole
@@ -152,14 +154,19 @@ struct PageMesher::Impl {
         return round_up_to_float(*std::max_element(base_m.begin(), base_m.end()));
     }
 
-    // With all that the curvature lowers it by, for any of the views.
-    Box box_of(TileId id, const HeightBounds& bounds, std::span<const Camera> views, double half_curvature) const {
+    Box own_box(const DrawnTile& tile) const {
         const Lattice& l = dataset.lattice;
-        const LatticePoint corner = l.corner(id);
+        const HeightBounds& bounds = header_of(tile).own;
+        const LatticePoint corner = l.corner(tile.id);
         const auto west = static_cast<double>(corner.i), north = static_cast<double>(corner.j),
-                   extent = static_cast<double>(l.tile_extent(id.level));
-        const Box box{{l.x_m(west), l.y_m(north + extent), dataset.height_m(bounds.min_n)},
-                      {l.x_m(west + extent), l.y_m(north), dataset.height_m(bounds.max_n)}};
+                   extent = static_cast<double>(l.tile_extent(tile.id.level));
+        return {{l.x_m(west), l.y_m(north + extent), dataset.height_m(bounds.min_n)},
+                {l.x_m(west + extent), l.y_m(north), dataset.height_m(bounds.max_n)}};
+    }
+
+    // With all that the curvature lowers it by, for any of the views.
+    Box box_of(const DrawnTile& tile, std::span<const Camera> views, double half_curvature) const {
+        const Box box = own_box(tile);
         Box low = box;
         if (half_curvature > 0)
             for (const Camera& view : views)
@@ -181,6 +188,23 @@ struct PageMesher::Impl {
                 k + 1 < rungs.size() ? std::ldexp(rungs[k + 1], exponent - 1) : std::ldexp(1, exponent)};
     }
 
+    // What a tile may err by, metres a pixel of tolerance: 1 / (f K m), m how large a unit of height looks at most from
+    // anywhere in its box, which holds what is drawn and what is true: h / r^2 (Scree lod, C1). Straight below an eye
+    // and far above or below it heights hardly show.
+    double allowed_m_per_px(const DrawnTile& tile, std::span<const Camera> views, double half_curvature) const {
+        double least = std::numeric_limits<double>::infinity();
+        for (std::size_t v = 0; v < views.size(); ++v) {
+            if ((tile.seen_by >> v & 1) == 0) continue;
+            const Camera& view = views[v];
+            const Box box = lowered_by_curvature(own_box(tile), view.eye, half_curvature);
+            const double seen = greatest_box_magnification(view.eye, box);
+            if (std::isnan(seen)) return 0;
+            // Nothing nearer than the near plane is seen.
+            least = std::min(least, 1 / (scale_px[v] * std::min(seen, 1 / view.near_m)));
+        }
+        return least;
+    }
+
     bool same_shape(const Chosen& c, const DrawnTile& tile, const MeshSettings& s) const {
         return c.valid && c.geomip == tile.geomip && c.edge_mask == tile.edge_mask &&
                c.part_level == part_level_of(tile) && c.half_curvature == s.half_curvature;
@@ -189,18 +213,16 @@ struct PageMesher::Impl {
     bool may_reuse(const Chosen& c, const DrawnTile& tile, std::span<const Camera> views, const MeshSettings& s) const {
         if (lod.reuse == ReuseTest::off || !same_shape(c, tile, s) || views.size() > kMostEyes) return false;
         if (c.tau_px != s.tau_px || (tile.seen_by & ~c.seen_by) != 0) return false;
-        const Box box = box_of(tile.id, header_of(tile).own, views, s.half_curvature);
+        const Box box = box_of(tile, views, s.half_curvature);
         for (std::size_t v = 0; v < views.size(); ++v) {
             if ((tile.seen_by >> v & 1) == 0) continue;
-            if (!may_reuse(c.eyes[v], c.error_px[v], tile, box, views[v], s)) return false;
+            if (scale_px[v] > c.error_px[v] || !may_reuse(c.eyes[v], tile, box, views[v], s)) return false;
         }
         return true;
     }
 
-    bool may_reuse(const glm::dvec3& then, double error_px, const DrawnTile& tile, const Box& box, const Camera& view,
+    bool may_reuse(const glm::dvec3& then, const DrawnTile& tile, const Box& box, const Camera& view,
                    const MeshSettings& s) const {
-        const double now_px = view.focal_px() * view.off_axis_factor();
-        if (now_px > error_px) return false;
         if (lod.reuse == ReuseTest::paper)
             return reuse_p1(then, view.eye, corners_of(tile, box), box, view.focal_px(), lod.s_px, s.tau_px);
         const EyeToBox before = eye_to_box(then, box), after = eye_to_box(view.eye, box);
@@ -233,7 +255,8 @@ struct PageMesher::Impl {
     void choose(const DrawnTile& tile, std::span<const Camera> views, const MeshSettings& s) {
         SlotState& state = state_of(tile);
         Chosen& c = state.chosen;
-        const double threshold_m = s.tau_px * tile.metres_per_px;
+        const double threshold_m =
+            lod.method == LodMethod::block_rsg ? s.tau_px * allowed_m_per_px(tile, views, s.half_curvature) : 0;
         if (lod.method == LodMethod::block_rsg) {
             if (threshold_m >= c.least_m && threshold_m < c.beyond_m && same_shape(c, tile, s)) return;
         } else if (may_reuse(c, tile, views, s)) {
@@ -266,7 +289,7 @@ struct PageMesher::Impl {
              {}};
         for (std::size_t v = 0; v < std::min(views.size(), kMostEyes); ++v) {
             c.eyes[v] = views[v].eye;
-            c.error_px[v] = views[v].focal_px() * views[v].off_axis_factor();
+            c.error_px[v] = scale_px[v];
         }
     }
 
@@ -401,6 +424,7 @@ struct PageMesher::Impl {
     }
 
     bool choose_and_make(std::span<const Camera> views, const MeshSettings& s) {
+        for (std::size_t v = 0; v < views.size(); ++v) scale_px[v] = views[v].focal_px() * views[v].off_axis_factor();
         for (const DrawnTile& tile : tiles) choose(tile, views, s);
         for (std::size_t t = 0; t < tiles.size(); ++t)
             std::copy_n(own_border(tiles[t]), edges.words(), edges.border(t));
@@ -411,8 +435,12 @@ struct PageMesher::Impl {
 
 namespace {
 
-/// The pool stands here and, shorter, in the renderer.
-constexpr std::size_t kIndexBytes = 2 * sizeof(std::uint32_t);
+/// The pool stands here and, shorter where a tile's vertices can be numbered so, in the renderer.
+std::size_t index_bytes(const Dataset& dataset) {
+    return sizeof(std::uint32_t) + (slot_vertex_count(dataset.lattice.tile_cells_log2) <= 65536
+                                        ? sizeof(std::uint16_t)
+                                        : sizeof(std::uint32_t));
+}
 
 std::size_t most_indices(const Dataset& dataset) {
     const std::size_t cells = std::size_t{1} << dataset.lattice.tile_cells_log2;
@@ -448,16 +476,17 @@ void PageMesher::mesh(std::span<const Camera> views, const MeshSettings& setting
 
 const MeshCounters& PageMesher::counters() const { return impl_->counters; }
 
-std::int64_t PageMesher::slot_cost(const Dataset& dataset) {
+std::int64_t PageMesher::slot_cost(const Dataset& dataset, const LodSettings& lod) {
     const std::size_t vertices = slot_vertex_count(dataset.lattice.tile_cells_log2);
     // What was chosen and what is drawn has a border each, beside that of the frame.
-    return TileVertices::slot_cost(dataset) + 3 * EdgeAgreement::slot_cost(dataset.lattice) +
-           static_cast<std::int64_t>(vertices + most_indices(dataset) / kPoolShare * kIndexBytes + sizeof(SlotState) +
-                                     sizeof(DrawnTile));
+    return TileVertices::slot_cost(dataset, lod.method == LodMethod::block_rsg) +
+           3 * EdgeAgreement::slot_cost(dataset.lattice) +
+           static_cast<std::int64_t>(vertices + most_indices(dataset) / kPoolShare * index_bytes(dataset) +
+                                     sizeof(SlotState) + sizeof(DrawnTile));
 }
 
 std::int64_t PageMesher::fixed_cost(const Dataset& dataset) {
-    return static_cast<std::int64_t>(kRoomyTiles * most_indices(dataset) * kIndexBytes);
+    return static_cast<std::int64_t>(kRoomyTiles * most_indices(dataset) * index_bytes(dataset));
 }
 
 }  // namespace scree

@@ -19,8 +19,8 @@
 namespace scree {
 
 /// Share of the tolerance that the cut may use up; the rest is for dropping vertices. Smaller: more pages, fewer
-/// triangles (docs/numbers.md, "Methods").
-inline constexpr double kCutShare = 0.5;
+/// triangles (docs/lod-methods.md).
+inline constexpr double kCutShare = 0.6;
 
 struct MeshSettings {
     double tau_px = 1;
@@ -57,7 +57,7 @@ public:
     const MeshCounters& counters() const;  ///< of the last mesh()
 
     /// Bytes for each height slot, and besides them; the renderer's copy of the meshes is counted.
-    static std::int64_t slot_cost(const Dataset& dataset);
+    static std::int64_t slot_cost(const Dataset& dataset, const LodSettings& lod);
     static std::int64_t fixed_cost(const Dataset& dataset);
 
 private:

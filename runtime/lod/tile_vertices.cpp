@@ -1,6 +1,7 @@
 #include "runtime/lod/tile_vertices.h"
 
 #include <algorithm>
+#include <bit>
 #include <cassert>
 #include <cmath>
 #include <cstring>
@@ -14,25 +15,43 @@ namespace {
 /// A tile with more of its vertices than this has all of them: it is drawn by its pattern, which takes no memory.
 constexpr double kWholeShare = 0.6;
 
+// The upper half of a float: 8 bits of its mantissa. Up, so that no error is taken for less than it is; what would pass
+// the greatest float is infinite.
+std::uint16_t rounded_up_half(float value) {
+    const auto bits = std::bit_cast<std::uint32_t>(value);
+    return static_cast<std::uint16_t>((bits >> 16) + ((bits & 0xffff) != 0 ? 1 : 0));
+}
+
+void widen(const std::uint16_t* halves, std::size_t count, float* out) {
+    for (std::size_t k = 0; k < count; ++k) out[k] = std::bit_cast<float>(std::uint32_t{halves[k]} << 16);
+}
+
 }  // namespace
 
-TileVertices::TileVertices(const Dataset& dataset, std::int64_t height_slots)
+TileVertices::TileVertices(const Dataset& dataset, std::int64_t height_slots, bool by_threshold)
     : lattice_(dataset.lattice),
       offset_m_(dataset.height_offset_m),
       quantum_m_(dataset.height_quantum_m),
       n_(lattice_.tile_cells_log2),
       m_(1 << n_),
       vertices_(slot_vertex_count(n_)),
+      by_threshold_(by_threshold),
       bisections_{Bisection(n_, false), Bisection(n_, true)},
       middle_m_(static_cast<std::size_t>(height_slots)),
+      step_m_(middle_m_.size()),
+      z_m_(vertices_),
+      error_m_(vertices_),
+      radius_m_(vertices_),
       bulge_(vertices_),
       errors_(vertices_),
       fails_(vertices_),
       places_(static_cast<std::size_t>(lattice_.deepest_level) + 1) {
     const std::size_t all = middle_m_.size() * vertices_;
-    z_.resize(all);
     error_.resize(all);
-    radius_.resize(all);
+    if (!by_threshold) {
+        z_.resize(all);
+        radius_.resize(all);
+    }
     // Half a hypotenuse of level k, squared: m^2 / 2 of the tile's own, half of that a level.
     for (const std::int32_t v : bisections_[0].coarse_to_fine())
         bulge_[static_cast<std::size_t>(v)] =
@@ -45,16 +64,28 @@ void TileVertices::put(std::int32_t slot, std::span<const SlotVertex> from, std:
         from.begin(), from.end(), [](const SlotVertex& a, const SlotVertex& b) { return a.height_n < b.height_n; });
     const double middle_n = std::floor((static_cast<double>(low->height_n) + static_cast<double>(high->height_n)) / 2);
     middle_m_[static_cast<std::size_t>(slot)] = offset_m_ + middle_n * quantum_m_;
+    for (std::size_t k = 0; k < vertices_; ++k) error_[at(slot) + k] = rounded_up_half(costs[k].error_m);
+    if (by_threshold_) return;
+    // Whole quanta but where a tile spans more than 65,535 of them; then the balls hold what the rounding moves.
+    const double reach_n = static_cast<double>(high->height_n) - middle_n;
+    const double step_n = std::max(1.0, std::ceil((reach_n + 1) / 32767));
+    const auto moved_m = step_n > 1 ? static_cast<float>(step_n * quantum_m_) : 0.0f;
+    step_m_[static_cast<std::size_t>(slot)] = static_cast<float>(step_n * quantum_m_);
     for (std::size_t k = 0; k < vertices_; ++k) {
-        z_[at(slot) + k] = static_cast<float>((static_cast<double>(from[k].height_n) - middle_n) * quantum_m_);
-        error_[at(slot) + k] = costs[k].error_m;
-        radius_[at(slot) + k] = costs[k].radius_m;
+        z_[at(slot) + k] =
+            static_cast<std::int16_t>(std::lround((static_cast<double>(from[k].height_n) - middle_n) / step_n));
+        radius_[at(slot) + k] = rounded_up_half(costs[k].radius_m + moved_m);
     }
 }
 
+const float* TileVertices::errors(std::int32_t slot) {
+    widen(error_.data() + at(slot), vertices_, error_m_.data());
+    return error_m_.data();
+}
+
 double TileVertices::height_m(std::int32_t slot, std::int32_t vertex) const {
-    return middle_m_[static_cast<std::size_t>(slot)] +
-           static_cast<double>(z_[at(slot) + static_cast<std::size_t>(vertex)]);
+    return middle_m_[static_cast<std::size_t>(slot)] + static_cast<double>(step_m_[static_cast<std::size_t>(slot)]) *
+                                                           z_[at(slot) + static_cast<std::size_t>(vertex)];
 }
 
 double TileVertices::spacing_m(TileId tile) const {
@@ -115,7 +146,7 @@ void TileVertices::add_parents(const TileShape& shape, std::uint8_t* active) con
 // tile's own vertices have it: off by as much as they are. Taken for all, that costs next to nothing, for it is within
 // the cut's share of the tolerance, and the errors stay monotone up the hierarchy.
 const float* TileVertices::curved_errors(const TileShape& shape, double half_curvature) {
-    const float* error = error_.data() + at(shape.slot);
+    const float* error = errors(shape.slot);
     const auto factor = static_cast<float>(spacing_m(shape.tile) * spacing_m(shape.tile) * half_curvature);
     for (std::size_t v = 0; v < vertices_; ++v) errors_[v] = std::max(error[v], shape.base_m) + factor * bulge_[v];
     return errors_.data();
@@ -125,15 +156,17 @@ void TileVertices::choose(const TileShape& shape, std::span<const VertexEye> eye
                           bool paper, std::uint8_t* active) {
     const std::vector<float>& place = places(shape.tile.level);
     const std::size_t first = at(shape.slot);
-    const VertexArrays arrays{place.data(), place.data() + vertices_, z_.data() + first, vertices_};
+    const float step_m = step_m_[static_cast<std::size_t>(shape.slot)];
+    for (std::size_t v = 0; v < vertices_; ++v) z_m_[v] = static_cast<float>(z_[first + v]) * step_m;
+    widen(radius_.data() + first, vertices_, radius_m_.data());
+    const VertexArrays arrays{place.data(), place.data() + vertices_, z_m_.data(), vertices_};
     const LatticePoint corner = lattice_.corner(shape.tile);
     const double half = 0.5 * static_cast<double>(lattice_.tile_extent(shape.tile.level));
     const glm::dvec3 middle{lattice_.x_m(static_cast<double>(corner.i) + half),
                             lattice_.y_m(static_cast<double>(corner.j) + half),
                             middle_m_[static_cast<std::size_t>(shape.slot)]};
     std::memset(active, 0, vertices_);
-    const float* error = error_.data() + first;
-    if (half_curvature > 0 && !paper) error = curved_errors(shape, half_curvature);
+    const float* error = half_curvature > 0 && !paper ? curved_errors(shape, half_curvature) : errors(shape.slot);
     for (const VertexEye& eye : eyes) {
         const LocalEye local{static_cast<float>(eye.eye.x - middle.x), static_cast<float>(eye.eye.y - middle.y),
                              static_cast<float>(eye.eye.z - middle.z)};
@@ -141,10 +174,10 @@ void TileVertices::choose(const TileShape& shape, std::span<const VertexEye> eye
         if (paper)
             fails_uc(arrays, error, local, scale, tau, fails_.data());
         else if (half_curvature > 0)
-            fails_ball_curved(arrays, error, radius_.data() + first, local, scale, static_cast<float>(kMetricFloor),
-                              tau, static_cast<float>(half_curvature), fails_.data());
+            fails_ball_curved(arrays, error, radius_m_.data(), local, scale, static_cast<float>(kMetricFloor), tau,
+                              static_cast<float>(half_curvature), fails_.data());
         else
-            fails_ball(arrays, error, radius_.data() + first, local, scale, static_cast<float>(kMetricFloor), tau,
+            fails_ball(arrays, error, radius_m_.data(), local, scale, static_cast<float>(kMetricFloor), tau,
                        fails_.data());
         for (std::size_t v = 0; v < vertices_; ++v) active[v] |= fails_[v];
     }
@@ -154,8 +187,7 @@ void TileVertices::choose(const TileShape& shape, std::span<const VertexEye> eye
 }
 
 void TileVertices::choose(const TileShape& shape, double threshold_m, double half_curvature, std::uint8_t* active) {
-    const float* error = error_.data() + at(shape.slot);
-    if (half_curvature > 0) error = curved_errors(shape, half_curvature);
+    const float* error = half_curvature > 0 ? curved_errors(shape, half_curvature) : errors(shape.slot);
     const auto threshold = static_cast<float>(threshold_m * (1 - 1e-6));
     fails_threshold(error, vertices_, threshold, active);
     restrict_to(shape, active);  // saturated errors are monotone: parents are there
@@ -171,9 +203,11 @@ bool TileVertices::complete_if_dense(const TileShape& shape, std::uint8_t* activ
     return true;
 }
 
-std::int64_t TileVertices::slot_cost(const Dataset& dataset) {
-    return static_cast<std::int64_t>(slot_vertex_count(dataset.lattice.tile_cells_log2) * 3 * sizeof(float) +
-                                     sizeof(double));
+std::int64_t TileVertices::slot_cost(const Dataset& dataset, bool by_threshold) {
+    const std::size_t halves = by_threshold ? 1 : 3;
+    return static_cast<std::int64_t>(slot_vertex_count(dataset.lattice.tile_cells_log2) * halves *
+                                         sizeof(std::uint16_t) +
+                                     sizeof(double) + sizeof(float));
 }
 
 }  // namespace scree

@@ -38,7 +38,8 @@ struct VertexEye {
 
 class TileVertices {
 public:
-    TileVertices(const Dataset& dataset, std::int64_t height_slots);
+    /// `by_threshold`: choose() by a threshold is all that will be asked for.
+    TileVertices(const Dataset& dataset, std::int64_t height_slots, bool by_threshold);
 
     void put(std::int32_t slot, std::span<const SlotVertex> vertices, std::span<const VertexCost> costs);
     double height_m(std::int32_t slot, std::int32_t vertex) const;
@@ -59,7 +60,7 @@ public:
     /// All vertices of a shape. True where the tile has most of them: then they are set.
     bool complete_if_dense(const TileShape& shape, std::uint8_t* active);
 
-    static std::int64_t slot_cost(const Dataset& dataset);
+    static std::int64_t slot_cost(const Dataset& dataset, bool by_threshold);
 
 private:
     /// Vertices that a tile of a stride with some edges thinned has, corners left out.
@@ -67,6 +68,7 @@ private:
     const std::vector<float>& places(int level);
     void restrict_to(const TileShape& shape, std::uint8_t* active);
     void add_parents(const TileShape& shape, std::uint8_t* active) const;
+    const float* errors(std::int32_t slot);
     /// Errors with what flat triangles miss of the earth's curvature, in errors_.
     const float* curved_errors(const TileShape& shape, double half_curvature);
     std::size_t at(std::int32_t slot) const { return static_cast<std::size_t>(slot) * vertices_; }
@@ -76,12 +78,17 @@ private:
     double offset_m_, quantum_m_;
     int n_, m_;
     std::size_t vertices_;
+    bool by_threshold_;
     std::array<Bisection, 2> bisections_;
-    // By slot, an entry a vertex: height over the slot's middle, and costs.
-    std::vector<float> z_, error_, radius_;
-    std::vector<double> middle_m_;  ///< by slot
-    std::vector<float> bulge_;      ///< by vertex: half of its hypotenuse, squared, samples
-    std::vector<float> errors_;     ///< a buffer: with curvature
+    // By slot, an entry a vertex, in two bytes each: height over the slot's middle, in its steps, and costs, rounded up
+    // (upper halves of floats). Where one threshold decides, neither places nor radii.
+    std::vector<std::int16_t> z_;
+    std::vector<std::uint16_t> error_, radius_;
+    std::vector<double> middle_m_;                 ///< by slot
+    std::vector<float> step_m_;                    ///< by slot
+    std::vector<float> z_m_, error_m_, radius_m_;  ///< buffers: of one tile
+    std::vector<float> bulge_;                     ///< by vertex: half of its hypotenuse, squared, samples
+    std::vector<float> errors_;                    ///< a buffer: with curvature
     std::vector<std::uint8_t> fails_;
     std::vector<std::vector<float>> places_;  ///< by level: x of all vertices from the tile's middle, then y; metres
     std::map<std::pair<int, unsigned>, std::vector<std::uint8_t>> allowed_;

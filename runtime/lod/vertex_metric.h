@@ -34,6 +34,27 @@ Real greatest_magnification(VertexSight<Real> s, Real rho, Real c) {
     return std::max(std::sqrt(s.h2) + rho, c * (std::sqrt(r2) + rho)) / within;
 }
 
+/// sup over a box of h / r^2, 1/m: no more than 1 / its distance, and far less straight under the eye or far below it.
+/// Infinite with the eye in the box. `Box`: low and high corners. A NaN stays one.
+template <class Point, class Box>
+double greatest_box_magnification(const Point& eye, const Box& box) {
+    const auto outside = [](double at, double low, double high) {
+        return at < low ? low - at : at > high ? at - high : 0 * at;
+    };
+    const double dx = outside(eye.x, box.low.x, box.high.x), dy = outside(eye.y, box.low.y, box.high.y),
+                 dz = outside(eye.z, box.low.z, box.high.z);
+    // h / (h^2 + dz^2) is greatest at h = |dz|.
+    double h = std::sqrt(dx * dx + dy * dy);
+    if (h < dz) {
+        const double far_x = std::max(std::abs(box.low.x - eye.x), std::abs(box.high.x - eye.x)),
+                     far_y = std::max(std::abs(box.low.y - eye.y), std::abs(box.high.y - eye.y));
+        h = std::min(std::sqrt(far_x * far_x + far_y * far_y), dz);
+    }
+    if (h == 0 && dz == 0) return std::numeric_limits<double>::infinity();
+    const double r = std::sqrt(h * h + dz * dz);
+    return std::isinf(r) ? 0 : h / r / r;
+}
+
 /// N*K: E > 0 and f K E sup(magnification) > tau. `error_px` = f K E.
 template <class Real>
 bool guaranteed_selects(Real error_px, Real rho, Real c, Real tau, VertexSight<Real> s) {

@@ -15,10 +15,11 @@ namespace {
 
 constexpr std::string_view kStyle = R"css(
 :root { color-scheme: light dark; --page: #ffffff; --ink: #1b1f24; --soft: #59636e; --rule: #d5dae0; --panel: #f6f8fa;
-  --blue: #0b62c4; --orange: #c2410c; --green: #0f7b4f; --violet: #7c3aed; --good: #0f7b4f; --bad: #b3261e; }
+  --blue: #0b62c4; --orange: #c2410c; --green: #0f7b4f; --violet: #7c3aed; --good: #0f7b4f; --bad: #b3261e;
+  --amber: #a16207; --rose: #be185d; --teal: #0f766e; --grey: #525252; }
 @media (prefers-color-scheme: dark) { :root { --page: #14171b; --ink: #e6e9ed; --soft: #a0aab5; --rule: #3a424c;
   --panel: #1d2227; --blue: #6cb2ff; --orange: #ff9a5c; --green: #57d39b; --violet: #b79cff; --good: #57d39b;
-  --bad: #ff8a80; } }
+  --bad: #ff8a80; --amber: #e3bf5a; --rose: #ff8fc0; --teal: #5ed1c5; --grey: #b5b5b5; } }
 * { box-sizing: border-box; }
 body { margin: 0 auto; padding: 2rem 1.25rem 4rem; max-width: 76rem; background: var(--page); color: var(--ink);
   font: 16px/1.5 system-ui, -apple-system, "Segoe UI", Roboto, "Noto Sans", sans-serif; }
@@ -47,6 +48,7 @@ figcaption { font-weight: 600; font-size: .95rem; margin-bottom: .2rem; }
 svg text { fill: var(--soft); font: 13px system-ui, -apple-system, "Segoe UI", Roboto, "Noto Sans", sans-serif; }
 svg .grid { stroke: var(--rule); stroke-width: 1; }
 .c0 { color: var(--blue); } .c1 { color: var(--orange); } .c2 { color: var(--green); } .c3 { color: var(--violet); }
+.c4 { color: var(--amber); } .c5 { color: var(--rose); } .c6 { color: var(--teal); } .c7 { color: var(--grey); }
 svg.plot .g { stroke: var(--rule); stroke-width: 1; }
 svg.plot .a { stroke: var(--soft); stroke-width: 1; }
 svg.plot .l { stroke: var(--ink); stroke-width: 1.2; stroke-dasharray: 2 3; }

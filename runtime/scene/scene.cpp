@@ -37,6 +37,10 @@ Box box_of(const Dataset& d, TileId id, glm::dvec3 eye, double half_curvature) {
 constexpr int kOpenings = 10;             // of a store that is updated again and again
 constexpr double kLongestTakeover_s = 2;  // with its roots there
 
+// Options may be changed between frames: what is no length stands for the least.
+double length_px(double px) { return px > 0 ? px : 0; }
+double texel_px(double px) { return px > 0 ? px : 1.0 / 1024; }
+
 constexpr double kMotionFades_s = 0.4;
 constexpr double kStill_m = 1e-3;
 
@@ -93,6 +97,11 @@ Result<std::unique_ptr<Scene>> Scene::open(std::shared_ptr<const SqliteStore> st
     if (options.lod.cracks == CrackFix::dike)
         return Error{ErrorCode::usage, fmt::format("{} draws no tiles: shot, fly, audit and the window show it",
                                                    command_line_of(options.lod))};
+    for (const auto& [px, name] :
+         {std::pair(options.tau_px, "tau_px"), std::pair(options.texture_tau_px, "texture_tau_px")})
+        if (!(px >= 0))
+            return Error{ErrorCode::usage,
+                         fmt::format("{} = {}: is no length, so nothing could be promised", name, px)};
     auto memory = plan_of(store->dataset(), options);
     if (!memory) return memory.error();
     return std::unique_ptr<Scene>(new Scene(std::move(store), options, *memory));
@@ -107,7 +116,7 @@ void Scene::make_selectors() {
 MoreMemory Scene::more_memory(const Dataset& dataset, const SceneOptions& options) {
     MoreMemory more;
     if (options.lod.method != LodMethod::geomip)
-        more = {PageMesher::slot_cost(dataset), PageMesher::fixed_cost(dataset)};
+        more = {PageMesher::slot_cost(dataset, options.lod), PageMesher::fixed_cost(dataset)};
     if (options.lod.metric == ErrorMetric::deboer) more.per_height_slot = Pager::corrections_cost();
     if (const std::int64_t cells = edge_cells(options); cells > 0)
         more.fixed += EdgeField::bytes(EdgeField::shape_of(dataset, cells), options.follow);
@@ -142,7 +151,7 @@ void Scene::make_edge_field() {
 // Thins what was selected, where the method does.
 void Scene::mesh(std::span<const Camera> views, double half_curvature, const Residency& residency,
                  Selection& selection) {
-    if (mesher_) mesher_->mesh(views, {options_.tau_px, half_curvature}, residency, selection);
+    if (mesher_) mesher_->mesh(views, {length_px(options_.tau_px), half_curvature}, residency, selection);
 }
 
 void Scene::forget_selections() {
@@ -326,8 +335,9 @@ LoaderCounters Scene::loader_counters(TileKind kind) const {
 
 SelectionSettings Scene::selection_settings(double half_curvature, double growth_s) const {
     const bool meshed = mesher_ != nullptr;
-    return {meshed ? options_.tau_px * kCutShare : options_.tau_px,
-            options_.texture_tau_px,
+    const double tau_px = length_px(options_.tau_px);
+    return {meshed ? tau_px * kCutShare : tau_px,
+            texel_px(options_.texture_tau_px),
             memory_.height_slots,
             memory_.texture_slots,
             half_curvature,

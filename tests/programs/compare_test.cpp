@@ -90,11 +90,18 @@ TEST_F(Comparing, MeasuresEveryMethodAndSaysItThreeTimes) {
         EXPECT_GE(cases.at(0.5)["psnr_db"], cases.at(8)["psnr_db"]) << method;
         EXPECT_LE(cases.at(0.5)["true_mean_px"], cases.at(8)["true_mean_px"]) << method;
     }
-    for (const auto& s : report["skipped"]) {
-        EXPECT_NE(s["reason"].get<std::string>().find("draws no tiles"), std::string::npos) << s.dump();
-        known.insert(s["method"]);
-    }
+    EXPECT_TRUE(report["skipped"].empty()) << report["skipped"].dump();
     EXPECT_GE(known.size(), 12u);
+    ASSERT_EQ(by_method.count("rsg, dikes"), 1u);
+    EXPECT_GT(by_method["rsg, dikes"][8]["triangles_mean"], 0);
+    EXPECT_LT(by_method["rsg, dikes"][8]["psnr_db"], 100) << "compared with what is the same";
+    double last = 0;
+    for (const auto& q : report["height_quantum"]["coarser"]) {
+        EXPECT_GT(q["quantum_m"], last);
+        EXPECT_GE(q["max_px"], q["p99_px"]);
+        last = q["quantum_m"];
+    }
+    EXPECT_EQ(report["height_quantum"]["coarser"].size(), 6u);
     ASSERT_EQ(by_method.count("geomip"), 1u);
 
     // The same truth as `audit` has.

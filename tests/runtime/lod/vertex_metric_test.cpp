@@ -8,6 +8,7 @@
 #include <glm/glm.hpp>
 
 #include "runtime/view/camera.h"
+#include "runtime/view/frustum.h"
 #include "tests/common/test_support.h"
 
 namespace scree {
@@ -270,6 +271,44 @@ TEST(ScreenError, IsNeverMoreThanTheMetricSaysFromAnyFieldOfViewAndWindow) {
     }
     EXPECT_GT(worst, 0.9);
     EXPECT_GT(worst_without_k, 2);  // C2
+}
+
+// Of boxes above, below, beside and around the eye: no point of a box looks larger, and one looks as large.
+TEST(BoxMagnification, IsTheGreatestOfItsPoints) {
+    SCREE_TRACE_SEED();
+    test::Random random(test::seed());
+    for (int k = 0; k < 300; ++k) {
+        const glm::dvec3 eye{0, 0, 0};
+        glm::dvec3 low, size;
+        for (int axis = 0; axis < 3; ++axis) {
+            low[axis] = between(random, -2000, 1000);
+            size[axis] = between(random, 0, axis == 2 ? 600 : 1200);
+        }
+        const Box box{low, low + size};
+        const double bound = greatest_box_magnification(eye, box);
+        double greatest = 0;
+        constexpr int kSteps = 24;
+        for (int x = 0; x <= kSteps; ++x)
+            for (int y = 0; y <= kSteps; ++y)
+                for (int z = 0; z <= kSteps; ++z) {
+                    const glm::dvec3 p = low + size * glm::dvec3(x, y, z) / double{kSteps};
+                    const double h2 = p.x * p.x + p.y * p.y, r2 = h2 + p.z * p.z;
+                    if (r2 > 0) greatest = std::max(greatest, std::sqrt(h2) / r2);
+                }
+        EXPECT_LE(greatest, bound * (1 + 1e-12));
+        const bool inside = glm::all(glm::lessThanEqual(box.low, eye)) && glm::all(glm::lessThanEqual(eye, box.high));
+        EXPECT_EQ(inside, std::isinf(bound));
+        if (inside) continue;
+        const double distance_m = distance_to_box(eye, box);
+        EXPECT_LE(bound, 1 / distance_m * (1 + 1e-12));
+        if (distance_m > 500) {
+            EXPECT_GT(greatest, 0.95 * bound) << k;
+        }
+    }
+    const Box below{{-1, -1, -1000}, {1, 1, -990}};
+    EXPECT_NEAR(greatest_box_magnification(glm::dvec3{0}, below), std::sqrt(2.0) / (990.0 * 990 + 2), 1e-15);
+    EXPECT_EQ(greatest_box_magnification(glm::dvec3{0, 0, 1e200}, below), 0);
+    EXPECT_TRUE(std::isnan(greatest_box_magnification(glm::dvec3{0, std::nan(""), 0}, below)));
 }
 
 }  // namespace

@@ -182,6 +182,37 @@ TEST_F(SceneOfHills, AMethodThatIsNotBuiltInIsRefusedBeforeAnythingIsTaken) {
     EXPECT_NE(scene.error().message.find("not built in"), std::string::npos) << scene.error().message;
 }
 
+TEST_F(SceneOfHills, AToleranceThatIsNoLengthIsRefusedAndLaterStandsForTheLeast) {
+    for (const double px : {std::nan(""), -1.0}) {
+        for (double SceneOptions::*which : {&SceneOptions::tau_px, &SceneOptions::texture_tau_px}) {
+            SceneOptions options = small_options();
+            options.*which = px;
+            const auto refused = Scene::open(stored_->store(), options);
+            ASSERT_FALSE(refused.ok());
+            EXPECT_EQ(refused.error().code, ErrorCode::usage);
+        }
+    }
+    for (const LodMethod method : {LodMethod::geomip, LodMethod::block_rsg}) {
+        SceneOptions options = small_options();
+        options.lod.method = method;
+        auto scene = Scene::open(stored_->store(), options);
+        ASSERT_TRUE(scene.ok()) << scene.error().message;
+        CpuArena arena(stored_->terrain().dataset(), (*scene)->memory().height_slots);
+        ASSERT_TRUE((*scene)->start(arena).ok());
+        const Camera camera = stored_->camera(512, 512);
+        const auto triangles_at = [&](double px) {
+            (*scene)->options().tau_px = px;
+            const auto frame = (*scene)->complete({&camera, 1});
+            EXPECT_TRUE(frame.ok());
+            return frame->selection->triangles;
+        };
+        const std::int64_t least = triangles_at(0), some = triangles_at(8);
+        EXPECT_GT(least, some);
+        EXPECT_EQ(triangles_at(std::nan("")), least);
+        EXPECT_EQ(triangles_at(-1), least);
+    }
+}
+
 TEST_F(SceneOfHills, ThePapersMetricGoesByWhatItsTilesCorrect) {
     const Camera camera = stored_->camera(200, 512);
     Staged own(*stored_, small_options());
