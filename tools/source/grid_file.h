@@ -51,6 +51,11 @@ bool looks_like_dted(std::string_view start);
 Result<GridFile> open_usgs_dem(ByteFile file);
 bool looks_like_usgs_dem(std::string_view start);
 
+/// Source: Golden Software, Surfer's help, "Surfer 6 Grid File Format". Samples are points, float32; 1.70141e38 is a
+/// void. The other kinds of Surfer grids (DSAA, DSRB) are refused by name.
+Result<GridFile> open_surfer(ByteFile file);
+bool looks_like_surfer(std::string_view start);
+
 // What they share.
 
 constexpr std::int64_t kMaxGridSide = std::int64_t{1} << 30;  ///< the lattice has no more cells a side

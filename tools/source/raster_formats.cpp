@@ -85,6 +85,10 @@ std::string names_of(const Formats& formats) {
 
 std::span<const GridFormat> grid_formats() {
     static const std::array kFormats = {
+        GridFormat{.name = "Surfer 6 grid",
+                   .shared_extensions = {".grd"},
+                   .begins_so = looks_like_surfer,
+                   .open = open_surfer},
         GridFormat{
             .name = "DTED", .extensions = {".dt0", ".dt1", ".dt2"}, .begins_so = looks_like_dted, .open = open_dted},
         GridFormat{.name = "SRTM .hgt", .extensions = {".hgt"}, .open = open_hgt},
