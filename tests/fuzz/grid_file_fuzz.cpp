@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 
 #include <fmt/format.h>
@@ -16,8 +17,8 @@ namespace scree::fuzz {
 namespace {
 
 // A header that stands beside samples is fuzzed instead of them where the name begins with b, and for c.dat.
-constexpr std::array kNames = {"a.asc", "a.dt1", "b.bil", "b.bip", "b.bsq",
-                               "b.flt", "b.dem", "c.dem", "c.dat", "N37W123.hgt"};
+constexpr std::array kNames = {"a.asc", "a.dt1", "b.bil", "b.bip",       "b.bsq", "b.flt",
+                               "b.dem", "c.dem", "c.dat", "N37W123.hgt", "d.grd"};
 
 std::string dted() {
     std::string file =
@@ -69,6 +70,19 @@ std::string usgs_dem(const char* system, const char* step_z, const char* record_
         if (padded) records.resize((records.size() + 1023) / 1024 * 1024, ' ');
         file += records + record_end;
     }
+    return file;
+}
+
+std::string surfer() {
+    std::string file = "DSBB";
+    const auto put = [&](auto number) {
+        std::array<char, sizeof(number)> bytes{};
+        std::memcpy(bytes.data(), &number, sizeof(number));
+        file.append(bytes.data(), bytes.size());
+    };
+    for (const int side : {5, 4}) put(static_cast<std::int16_t>(side));
+    for (const double limit : {1000.0, 1040.0, 5000.0, 5060.0, 0.0, 19.0}) put(limit);
+    for (int i = 0; i < 20; ++i) put(static_cast<float>(i));
     return file;
 }
 
@@ -133,7 +147,7 @@ std::vector<std::string> seeds() {
                 "interleave = bil\nbyte order = 1\nmap info = {UTM, 1, 1, 5, 6, 7, 8, 33, North, WGS-84}\n"
                 "coordinate system string = {GEOGCS[\"x\"]}\ndata ignore value = -1\n"),
         // Of another size than a tile's: georeference_fuzz has whole ones.
-        of_kind(9, "x")};
+        of_kind(9, "x"), of_kind(10, surfer())};
     require_a_seed_of_every_format(all);
     return all;
 }

@@ -1,6 +1,9 @@
 // Places that cannot be, or hardly: each is refused with a reason or built soundly.
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cmath>
+#include <cstring>
 #include <fstream>
 
 #include "tests/common/test_support.h"
@@ -22,6 +25,21 @@ protected:
             << step << "\nNODATA_value -9999\n";
         for (int k = 0; k < columns * rows; ++k) out << (negative && k % 2 == 1 ? "-" : "") << value << '\n';
         return folder_.file(name);
+    }
+    // A Surfer 6 grid of 9 x 9 samples whose header says so.
+    std::string surfer(int columns, int rows, double west, double east, float value = 7) {
+        std::ofstream out(folder_.file("a.grd"), std::ios::binary | std::ios::trunc);
+        const auto put = [&](auto number) {
+            std::array<char, sizeof(number)> bytes{};
+            std::memcpy(bytes.data(), &number, sizeof(number));
+            out.write(bytes.data(), bytes.size());
+        };
+        out << "DSBB";
+        for (const int side : {columns, rows}) put(static_cast<std::int16_t>(side));
+        for (const double limit : {west, east, 5300000.0, 5300080.0, 0.0, 1.0}) put(limit);
+        for (int k = 0; k < 81; ++k) put(k % 27 == 10 ? 1.70141e38F : value);
+        out.close();
+        return folder_.file("a.grd");
     }
     ProgramRun build(std::vector<std::string> files, const std::string& crs) {
         files.insert(files.begin(), "build");
@@ -62,6 +80,19 @@ TEST_F(AbsurdPlaces, OfHeightsAreRefusedWithTheReason) {
     expect_refused(build({grid("a.asc", "0", "0", "10", "1e6", 9, 9, true), "--height-quantum", "0.01"}, utm_), kUsage,
                    "cannot hold");
     expect_built(build({grid("a.asc", "0", "0", "10", "1e6", 9, 9, true)}, utm_));
+}
+
+TEST_F(AbsurdPlaces, OfSurferGridsAreRefusedWithTheReason) {
+    const double west = 500000, east = 500080;
+    expect_refused(build({surfer(-9, 9, west, east)}, utm_), kInput, "a.grd: its header says -9 x 9 samples");
+    expect_refused(build({surfer(1, 81, west, east)}, utm_), kInput, "cannot be placed");
+    expect_refused(build({surfer(32767, 32767, west, east)}, utm_), kInput, "4294705212 bytes");
+    expect_refused(build({surfer(9, 8, west, east)}, utm_), kInput, "the file has 380");
+    expect_refused(build({surfer(9, 9, east, west)}, utm_), kInput, "x goes from 500080 to 500000");
+    expect_refused(build({surfer(9, 9, west, 1e300)}, utm_), kInput, "nowhere");
+    expect_refused(build({surfer(9, 9, std::nan(""), east)}, utm_), kInput, "nan");
+    expect_refused(build({surfer(9, 9, west, east, 1.70141e38F)}, utm_), kInput, "every height is a void");
+    expect_built(build({surfer(9, 9, west, east)}, utm_));
 }
 
 TEST_F(AbsurdPlaces, OfFilesThatDoNotMeet) {

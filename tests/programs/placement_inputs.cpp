@@ -179,6 +179,23 @@ void write_usgs_dem(const std::string& path, const SampleGrid& g, const SampleVa
     open_output(path) << file;
 }
 
+// Golden Software, "Surfer 6 Grid File Format": limits are those of the outermost samples, rows go from south to north.
+void write_surfer(const std::string& path, const SampleGrid& g, const SampleValue& value) {
+    std::ofstream out = open_output(path);
+    const auto put = [&](auto number) {
+        std::array<char, sizeof(number)> bytes{};
+        std::memcpy(bytes.data(), &number, sizeof(number));
+        out.write(bytes.data(), bytes.size());
+    };
+    out << "DSBB";
+    for (const int side : {g.width, g.height}) put(static_cast<std::int16_t>(side));
+    for (const double x : {g.first_x, g.x(g.width - 1, 0)}) put(x);
+    for (const double y : {g.y(0, g.height - 1), g.first_y}) put(y);
+    for (const double z : {0.0, 1e4}) put(z);
+    for (int r = g.height - 1; r >= 0; --r)
+        for (int c = 0; c < g.width; ++c) put(static_cast<float>(value(c, r)));
+}
+
 void write_pixels(const std::string& path, const SampleGrid& g, int channels, OIIO::TypeDesc type, const void* pixels) {
     const auto out = OIIO::ImageOutput::create(path);
     require(out && out->open(path, OIIO::ImageSpec(g.width, g.height, channels, type)) &&
@@ -261,6 +278,9 @@ std::string write_placed_heights(const std::string& folder, const std::string& n
         case HeightFormat::usgs_dem:
             write_usgs_dem(stem + ".dem", g, value);
             return stem + ".dem";
+        case HeightFormat::surfer:
+            write_surfer(stem + ".grd", g, value);
+            return stem + ".grd";
         case HeightFormat::png: {
             const auto samples = samples_of<std::uint16_t>(g, value);
             write_pixels(stem + ".png", g, 1, OIIO::TypeDesc::UINT16, samples.data());
@@ -280,6 +300,9 @@ std::vector<PlacedExample> placed_grid_examples() {
     areas.area = true;
     SampleGrid oblong = areas;
     oblong.row_y = -41;
+    SampleGrid oblong_points = points;
+    oblong_points.row_y = -41;
+    const SampleGrid degrees = north_up("EPSG:4326", 13.7, 47.4, 1.0 / 1200, 61, 67);
     const std::vector<std::string> utm{"--assume-crs", "EPSG:32633"};
     return {{HeightFormat::ascii_corner, areas, utm},
             {HeightFormat::ascii_corner, oblong, utm},
@@ -289,6 +312,9 @@ std::vector<PlacedExample> placed_grid_examples() {
             {HeightFormat::float_center, areas, utm},
             {HeightFormat::bil, areas, utm},
             {HeightFormat::usgs_dem, points, {}},
+            {HeightFormat::surfer, points, utm},
+            {HeightFormat::surfer, oblong_points, utm},
+            {HeightFormat::surfer, degrees, {"--assume-crs", "EPSG:4326"}},
             {HeightFormat::dted, north_up("EPSG:4326", 14, 48, 1.0 / 120, 121, 121), {}},
             {HeightFormat::hgt, north_up("EPSG:4326", -71, -30, 1.0 / 600, 601, 1201, 1.0 / 1200), {}, 27}};
 }

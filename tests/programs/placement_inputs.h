@@ -47,6 +47,7 @@ enum class HeightFormat {
     hgt,              ///< named by its corner
     dted,
     usgs_dem,  ///< UTM on WGS 84, heights in whole metres
+    surfer,    ///< Surfer 6, float
     png        ///< 16 bits, world file
 };
 
