@@ -367,6 +367,11 @@ bool BlockWorld::test_level(int index, int level, const Sighting& s, double dist
     } else {
         const double scale = s.rules.metric == BlockMetric::nested ? s.focal_px : s.focal_px * s.off_axis;
         if (curving_m > 0) {
+            // The widest that a ball becomes, at the block's far end.
+            const double radius_m = static_cast<double>(most.radius),
+                         far_m = distance_m + glm::length(block.box.high - block.box.low),
+                         reach_m = radius_m * (1 + (2 * far_m + radius_m) * s.rules.half_curvature);
+            if (scale * error_m < tolerance * (distance_m - reach_m)) return false;
             fails_ball_curved(vertices, error, radius_.data() + at, eye, rounded_up(scale),
                               static_cast<float>(s.rules.floor), rounded_down(tau_px),
                               rounded_up(s.rules.half_curvature), fails + first);
@@ -384,7 +389,9 @@ bool BlockWorld::test_level(int index, int level, const Sighting& s, double dist
 // rounding leave a vertex without its parents.
 void BlockWorld::choose(int index, const Sighting& sighting, std::uint8_t* active) const {
     std::array<std::uint8_t, kMaxBlockVertices> fails{};
-    const double distance_m = distance_to_box(sighting.eye, blocks_[static_cast<std::size_t>(index)].box);
+    const double distance_m =
+        distance_to_box(sighting.eye, lowered_by_curvature(blocks_[static_cast<std::size_t>(index)].box, sighting.eye,
+                                                           sighting.rules.half_curvature));
     const int levels = bisection_->levels();
     int finest = 0;
     for (int level = 1; level <= levels; ++level)
