@@ -12,8 +12,8 @@ packages=(
     libgeotiff-dev libimath-dev libopenimageio-dev libproj-dev libtbb-dev libtiff-dev
     # scree-view: the window, headless OpenGL with Mesa's software driver, pictures out
     libegl-dev libegl-mesa0 libepoxy-dev libgl1-mesa-dri libglfw3-dev libglm-dev libimgui-dev libpng-dev
-    # tests; a virtual display for those of the window
-    groff-base imagemagick libgtest-dev libstb-dev xauth xdotool xvfb
+    # tests; a virtual display for those of the window, shells for those of completion
+    fish groff-base imagemagick libgtest-dev libstb-dev xauth xdotool xvfb zsh
     # benches, and the encoders they measure against
     libbenchmark-dev libsquish-dev
 )
