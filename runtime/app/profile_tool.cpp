@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "common/crs_label.h"
 #include "runtime/app/stage_lines.h"
 
 namespace scree {
@@ -51,16 +52,17 @@ ProfileSummary summary_of(const Profile& profile, double exaggeration) {
 }
 
 std::string csv_of(const Profile& profile, const Dataset& dataset) {
+    std::string crs = crs_code_or_name(dataset);
+    std::replace(crs.begin(), crs.end(), ',', ' ');  // a name, and a column of its own
     std::string csv = "along_m,x_m,y_m,height_m,longitude_deg,latitude_deg,crs\n";
     for (std::size_t k = 0; k < profile.points.size(); ++k) {
         const Profile::Point& point = profile.points[k];
         const glm::dvec2 at = profile.points.size() > 1 ? place_of(profile, k) : profile.from_m;
         const auto on_earth = dataset.geo_grid ? dataset.geo_grid->lon_lat(at.x, at.y) : std::nullopt;
-        csv +=
-            fmt::format("{:.3f},{:.3f},{:.3f},{},{},{}\n", point.along_m, at.x, at.y,
-                        point.height_m ? fmt::format("{:.3f}", *point.height_m / dataset.exaggeration) : "",
-                        on_earth ? fmt::format("{:.7f},{:.7f}", on_earth->longitude_deg, on_earth->latitude_deg) : ",",
-                        dataset.crs);
+        csv += fmt::format(
+            "{:.3f},{:.3f},{:.3f},{},{},{}\n", point.along_m, at.x, at.y,
+            point.height_m ? fmt::format("{:.3f}", *point.height_m / dataset.exaggeration) : "",
+            on_earth ? fmt::format("{:.7f},{:.7f}", on_earth->longitude_deg, on_earth->latitude_deg) : ",", crs);
     }
     return csv;
 }

@@ -1,6 +1,7 @@
 // What stands over the picture.
 #include <fmt/format.h>
 
+#include "common/crs_label.h"
 #include "runtime/app/hud_text.h"
 #include "runtime/app/viewer.h"
 
@@ -43,8 +44,7 @@ void Viewer::describe_place(HudModel& model) const {
     model.place.push_back({"cursor", pointing ? place_text(*cursor_hit_.point, d) : std::string("-")});
     if (d.geo_grid)
         model.place.push_back({"", pointing ? lon_lat_text(*cursor_hit_.point, d).value_or("-") : std::string("-")});
-    if (!d.crs_name.empty() || !d.crs.empty())
-        model.place.push_back({"system", d.crs_name.empty() ? d.crs : fmt::format("{} ({})", d.crs_name, d.crs)});
+    if (!d.crs.empty()) model.place.push_back({"system", crs_label(d)});
 }
 
 void Viewer::describe_signs(HudModel& model) const {

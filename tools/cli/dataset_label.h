@@ -1,16 +1,13 @@
-// What commands call a dataset's CRS.
+// A dataset's CRS, as commands use it.
 #pragma once
 
 #include <optional>
-#include <string>
 
+#include "common/crs_label.h"
 #include "common/dataset.h"
 #include "tools/source/crs.h"
 
 namespace scree {
-
-/// One short line: "EPSG:n (name)"; of a CRS without a code its name; "none".
-std::string crs_label(const Dataset& dataset);
 
 /// None where the dataset says none, or one that PROJ does not know.
 std::optional<Crs> crs_of(const Dataset& dataset);

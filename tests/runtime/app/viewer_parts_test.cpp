@@ -102,6 +102,9 @@ TEST(ProfileTool, WritesALineAPointAndNoHeightWhereThereIsNoGround) {
     EXPECT_NE(csv_of(some_profile(), dataset).find("0.000,0.000,0.000,10.000,90.0000000,60.0000000,EPSG:32651\n"),
               std::string::npos)
         << csv_of(some_profile(), dataset);
+    dataset.crs = "PROJCRS[\"a page\",of,it]";
+    dataset.crs_name = "Lambert, conic";
+    EXPECT_NE(csv_of(some_profile(), dataset).find(",60.0000000,Lambert  conic\n"), std::string::npos);
 }
 
 TEST(ProfileTool, TakesTheAnswerToItsOwnQuestionOnly) {
