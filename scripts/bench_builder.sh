@@ -89,11 +89,15 @@ if wants ortho; then
     echo "16384^2 orthophotos over a 1025^2 DEM"
     built alone "$data/ortho/dem.tif"
     for image in "${images[@]}"; do
-        name=$(basename -- "$image" .tif)
-        built "$name" "$data/ortho/dem.tif" --imagery "$image"
-        line "$name"
-        awk -v all="$(field "$name" cpu_seconds)" -v decode="$(reading "$image")" 'BEGIN {
-            printf "    decoding %.2f CPU s; beyond it %.2f ns a source pixel\n", decode, (all - decode) / (16384 * 16384) * 1e9 }'
+        decode=$(reading "$image")
+        for codec in split raw; do
+            name=$(basename -- "$image" .tif)
+            [[ $codec == split ]] || name=${name}_unpacked
+            built "$name" "$data/ortho/dem.tif" --imagery "$image" --texture-codec "$codec"
+            line "$name"
+            awk -v all="$(field "$name" cpu_seconds)" -v decode="$decode" 'BEGIN {
+                printf "    decoding %.2f CPU s; beyond it %.2f ns a source pixel\n", decode, (all - decode) / (16384 * 16384) * 1e9 }'
+        done
     done
 fi
 if wants dem; then

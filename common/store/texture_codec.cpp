@@ -21,6 +21,8 @@ Error bad(std::string what) { return {ErrorCode::store, "texture tile: " + std::
 
 constexpr std::size_t kPlanes = 4;
 
+constexpr NamedTextureCodec kNamed[] = {{TextureCodec::raw, "raw"}, {TextureCodec::split, "split"}};
+
 struct CompressionContext {
     std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)> zstd{ZSTD_createCCtx(), ZSTD_freeCCtx};
     std::vector<std::uint8_t> plain;
@@ -150,6 +152,8 @@ std::size_t compress_split(std::span<const std::uint8_t> plain, CompressionConte
 }
 
 }  // namespace
+
+std::span<const NamedTextureCodec> texture_codecs() { return kNamed; }
 
 std::vector<std::uint8_t> encode_texture_tile(const TextureTile& tile, int size_log2, TextureCodec codec) {
     const std::size_t size = bc1_chain_bytes(size_log2);

@@ -15,6 +15,13 @@ enum class TextureCodec : int {
     split = 1  ///< endpoints and selectors apart, byte planes of the endpoints, Zstandard
 };
 
+struct NamedTextureCodec {
+    TextureCodec codec;
+    const char* name;  ///< as `scree build --texture-codec` takes it
+};
+/// All of them by number.
+std::span<const NamedTextureCodec> texture_codecs();
+
 std::vector<std::uint8_t> encode_texture_tile(const TextureTile& tile, int texture_size_log2, TextureCodec codec);
 
 /// Errors: ErrorCode::store for any payload that is not exactly one well-formed tile.

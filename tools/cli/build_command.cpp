@@ -14,6 +14,7 @@
 #include "tools/cli/height_options.h"
 #include "tools/pyramid/build_record.h"
 #include "tools/pyramid/builder.h"
+#include "tools/pyramid/codec_names.h"
 #include "tools/source/number_text.h"
 
 namespace scree {
@@ -24,19 +25,6 @@ const std::map<std::string, Kernel> kKernels = {
 
 const std::map<std::string, TextureQuality> kTextureQualities = {{"normal", TextureQuality::normal},
                                                                  {"high", TextureQuality::high}};
-
-std::map<std::string, HeightCodec> height_codec_choices() {
-    std::map<std::string, HeightCodec> choices;
-    for (const NamedHeightCodec& named : height_codecs()) choices[named.name] = named.codec;
-    return choices;
-}
-
-// "raw|plane", by number.
-std::string height_codec_names() {
-    std::string names;
-    for (const NamedHeightCodec& named : height_codecs()) names += (names.empty() ? "" : "|") + std::string(named.name);
-    return names;
-}
 
 void print_plan(const BuildPlan& plan) {
     const Dataset& d = plan.dataset;
@@ -105,9 +93,14 @@ int run_build(int argc, char** argv) {
     app.add_option("--height-quantum", options.height_quantum_m,
                    "Metres of the height unit; default: the source's own for integers, 1/64 m otherwise");
     app.add_option("--height-codec", options.height_codec, "How height tiles are packed; every one is without loss")
-        ->transform(CLI::CheckedTransformer(height_codec_choices(), CLI::ignore_case).description(""))
-        ->type_name(height_codec_names())
+        ->transform(CLI::CheckedTransformer(codecs_by_name(height_codecs()), CLI::ignore_case).description(""))
+        ->type_name(codec_names(height_codecs()))
         ->default_str("plane");
+    app.add_option("--texture-codec", options.texture_codec,
+                   "How texture tiles are packed; both without loss. raw: built faster, half as large again")
+        ->transform(CLI::CheckedTransformer(codecs_by_name(texture_codecs()), CLI::ignore_case).description(""))
+        ->type_name(codec_names(texture_codecs()))
+        ->default_str("split");
     app.add_option("--threads", options.threads, "0: one a core")->capture_default_str()->check(CLI::Range(0, 1024));
     app.add_option("--memory", memory, "Ceiling of resident memory, at least 192M")->capture_default_str();
     app.add_option("--attribution", options.attribution, "Text shown with the terrain");

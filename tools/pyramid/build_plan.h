@@ -11,6 +11,7 @@
 #include "common/dataset.h"
 #include "common/result.h"
 #include "common/store/height_codec.h"
+#include "common/store/texture_codec.h"
 #include "tools/mosaic/mosaic_plan.h"
 #include "tools/pyramid/bc1_encoder.h"
 #include "tools/pyramid/coverage.h"
@@ -36,6 +37,7 @@ struct BuildOptions : HeightReading {
     HeightCodec height_codec = HeightCodec::plane;
     int tile_size = 33;
     int texture_size = 256;
+    TextureCodec texture_codec = TextureCodec::split;
     TextureQuality texture_quality = TextureQuality::normal;  ///< high: DXT1 takes ten to twenty times as long
     int threads = 0;                                          ///< 0: all cores
     std::int64_t memory_bytes = std::int64_t{256} << 20;      ///< ceiling of the process's resident memory

@@ -10,6 +10,7 @@
 #include <sstream>
 #include <vector>
 
+#include "tools/pyramid/codec_names.h"
 #include "tools/source/number_text.h"
 
 namespace scree {
@@ -112,12 +113,6 @@ RecordedOption choice(const char* name, T BuildOptions::*field, std::map<std::st
             }};
 }
 
-std::map<std::string, HeightCodec> height_codec_choices() {
-    std::map<std::string, HeightCodec> choices;
-    for (const NamedHeightCodec& named : height_codecs()) choices[named.name] = named.codec;
-    return choices;
-}
-
 Text stretch_text(const BuildOptions& o) {
     const auto& stretch = o.colours.stretch;
     if (!stretch) return std::nullopt;
@@ -181,7 +176,7 @@ const std::vector<RecordedOption>& recorded() {
                                {{"terrarium", HeightEncoding::terrarium}, {"mapbox", HeightEncoding::mapbox}}),
         number<std::optional<double>>("nodata", &BuildOptions::nodata),
         number<std::optional<double>>("height-quantum", &BuildOptions::height_quantum_m),
-        choice<HeightCodec>("height-codec", &BuildOptions::height_codec, height_codec_choices()),
+        choice<HeightCodec>("height-codec", &BuildOptions::height_codec, codecs_by_name(height_codecs())),
         {"bands", bands_text, set_bands},
         {"stretch", stretch_text, set_stretch},
         {"imagery-nodata", [](const BuildOptions& o) { return text_of(o.colours.nodata); },
@@ -189,6 +184,7 @@ const std::vector<RecordedOption>& recorded() {
              o.colours.nodata = parse_number(text);
              return o.colours.nodata.has_value();
          }},
+        choice<TextureCodec>("texture-codec", &BuildOptions::texture_codec, codecs_by_name(texture_codecs())),
         choice<TextureQuality>("texture-quality", &BuildOptions::texture_quality, {{"high", TextureQuality::high}}),
         size("tile-size", &BuildOptions::tile_size),
         size("texture-size", &BuildOptions::texture_size),

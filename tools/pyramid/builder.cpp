@@ -165,6 +165,7 @@ private:
         job.deep_texels_wide = plan_.deep_texels_wide;
         job.writer = writer_.get();
         job.quality = options_.texture_quality;
+        job.codec = options_.texture_codec;
         job.stop = &stop_;
         TextureStage stage(std::move(job));
         rows_ = stage.district_rows();

@@ -10,7 +10,6 @@
 #include <tuple>
 #include <unordered_set>
 
-#include "common/store/texture_codec.h"
 #include "tools/pyramid/texture_filter.h"
 #include "tools/stage_clock.h"
 
@@ -280,7 +279,7 @@ struct TexturePyramid::Impl {
         TextureTile tile = assemble(id.level, x, y);
         if (!stored && children == 0 && !above_deepest && !any_opaque(tile, job.texture_size_log2)) return nothing;
         tile.child_mask = children;
-        return encode_texture_tile(tile, job.texture_size_log2, TextureCodec::split);
+        return encode_texture_tile(tile, job.texture_size_log2, job.codec);
     }
 };
 

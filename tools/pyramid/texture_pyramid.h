@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "common/dataset.h"
+#include "common/store/texture_codec.h"
 #include "tools/pyramid/bc1_encoder.h"
 #include "tools/pyramid/texture_depth.h"
 
@@ -25,6 +26,7 @@ struct TexturePyramidJob {
     int deepest_level = 0;
     int root_level = 0;
     TextureQuality quality = TextureQuality::normal;
+    TextureCodec codec = TextureCodec::split;
     /// The rectangle, in tiles of root_level; cut to the data's extent.
     std::int64_t first_column = 0, first_row = 0, columns = kMaxCellsPerSide, rows = kMaxCellsPerSide;
     /// Tiles that are stored whatever they show, by address. Any thread.

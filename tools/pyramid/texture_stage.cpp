@@ -9,7 +9,6 @@
 #include <unordered_set>
 
 #include "common/store/seed_codec.h"
-#include "common/store/texture_codec.h"
 #include "tools/pyramid/texture_filter.h"
 #include "tools/pyramid/texture_pyramid.h"
 #include "tools/stage_clock.h"
@@ -269,8 +268,8 @@ private:
 };
 
 Result<void> TextureStage::sink(TileId id, std::vector<std::uint8_t> payload) {
-    return job_.writer->put(TileKind::texture, *tile_key(job_.dataset.lattice, id),
-                            static_cast<int>(TextureCodec::split), std::move(payload));
+    return job_.writer->put(TileKind::texture, *tile_key(job_.dataset.lattice, id), static_cast<int>(job_.codec),
+                            std::move(payload));
 }
 
 // No heights at all, by what is known of the dense part.
@@ -291,6 +290,7 @@ Result<std::unique_ptr<TexturePyramid>> TextureStage::build_piece(const Rectangl
     job.columns = rectangle.columns;
     job.rows = rectangle.rows;
     job.quality = job_.quality;
+    job.codec = job_.codec;
     job.stored = [&](TileId id) { return job_.index->stored(id); };
     job.has_heights = [&](TileId id) { return has_heights(id); };
     job.shared_levels = job_.base.deepest_level;
@@ -456,6 +456,7 @@ Result<void> TextureStage::build_crown() {
     job.texture_size_log2 = d.texture_size_log2;
     job.deepest_level = seeds - 1;
     job.quality = job_.quality;
+    job.codec = job_.codec;
     job.stored = [&](TileId id) { return job_.index->stored(id); };
     job.shared_levels = job_.base.deepest_level;
     job.children_below = [&](TileId id) {

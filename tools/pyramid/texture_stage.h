@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/dataset.h"
+#include "common/store/texture_codec.h"
 #include "tools/pyramid/bc1_encoder.h"
 #include "tools/pyramid/height_index.h"
 #include "tools/pyramid/level_imagery.h"
@@ -32,6 +33,7 @@ struct TextureStageJob {
     std::function<bool(TileId id)> deep_wanted;
     TileWriter* writer = nullptr;  ///< takes textures and seeds
     TextureQuality quality = TextureQuality::normal;
+    TextureCodec codec = TextureCodec::split;
     /// Finds seeds that the writer does not have (those of districts that are not built again). Null: none.
     std::function<Result<bool>(std::int64_t key, TileRow& row)> other_seeds;
     std::function<void(std::int64_t texels)> on_texels;

@@ -282,6 +282,7 @@ private:
         job.deep_wanted = [&](TileId id) { return is_deep_dirty(id); };
         job.writer = writer_.get();
         job.quality = build_.texture_quality;
+        job.codec = build_.texture_codec;
         job.other_seeds = [&](std::int64_t key, TileRow& row) -> Result<bool> {
             if (was_made_again(TileKind::seed, key)) return false;  // it has none now
             const TileId id = *tile_from_key(dataset_.lattice, key);

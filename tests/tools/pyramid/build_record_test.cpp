@@ -25,6 +25,7 @@ const Record kAll = {{"crs", "EPSG:32633"},
                      {"nodata", "-9999"},
                      {"height-quantum", "0.25"},
                      {"height-codec", "raw"},
+                     {"texture-codec", "raw"},
                      {"bands", "3,2,1"},
                      {"stretch", "auto 10,900"},
                      {"imagery-nodata", "0"},
@@ -78,8 +79,22 @@ TEST(BuildRecord, EveryHeightCodecIsRecordedByItsName) {
     }
 }
 
+TEST(BuildRecord, EveryTextureCodecIsRecordedByItsName) {
+    for (const NamedTextureCodec& codec : texture_codecs()) {
+        BuildOptions options;
+        options.texture_codec = codec.codec;
+        const Record record = options_record(options, std::nullopt);
+        EXPECT_EQ(record,
+                  codec.codec == BuildOptions{}.texture_codec ? Record{} : Record({{"texture-codec", codec.name}}));
+        BuildOptions again;
+        ASSERT_TRUE(apply_record(record, again));
+        EXPECT_EQ(again.texture_codec, codec.codec);
+    }
+}
+
 TEST(BuildRecord, WhatIsUnknownIsRefusedAndNamed) {
-    for (const auto& [name, value] : {std::pair{"no-such-option", "1"}, std::pair{"height-codec", "newer"}}) {
+    for (const auto& [name, value] :
+         {std::pair{"no-such-option", "1"}, std::pair{"height-codec", "newer"}, std::pair{"texture-codec", "newer"}}) {
         BuildOptions options;
         const auto applied = apply_record({{name, value}}, options);
         ASSERT_FALSE(applied);

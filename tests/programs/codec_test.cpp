@@ -1,4 +1,4 @@
-// Every height codec through every command that meets one.
+// Every codec of heights and of textures through every command that meets one.
 #include <gtest/gtest.h>
 
 #include <regex>
@@ -6,6 +6,7 @@
 
 #include "common/store/height_codec.h"
 #include "common/store/sqlite_store.h"
+#include "common/store/texture_codec.h"
 #include "tests/common/test_support.h"
 #include "tests/programs/reports.h"
 #include "tests/programs/sample_inputs.h"
@@ -15,6 +16,19 @@ namespace scree::test {
 namespace {
 
 using List = std::vector<std::string>;
+
+std::set<int> codecs_of(TileKind kind, const std::string& path) {
+    std::set<int> found;
+    auto store = SqliteStore::open(path);
+    EXPECT_TRUE(store.ok());
+    if (!store) return found;
+    const auto seen = (*store)->for_each(kind, [&](const SqliteStore::RowView& row) {
+        found.insert(row.codec);
+        return true;
+    });
+    EXPECT_TRUE(seen.ok());
+    return found;
+}
 
 class HeightCodecs : public ::testing::Test {
 protected:
@@ -32,18 +46,7 @@ protected:
         build_store_from(arguments, store_);
         return digest_of(store_);
     }
-    std::set<int> codecs_in_the_store() const {
-        std::set<int> found;
-        auto store = SqliteStore::open(store_);
-        EXPECT_TRUE(store.ok());
-        if (!store) return found;
-        const auto seen = (*store)->for_each(TileKind::height, [&](const SqliteStore::RowView& row) {
-            found.insert(row.codec);
-            return true;
-        });
-        EXPECT_TRUE(seen.ok());
-        return found;
-    }
+    std::set<int> codecs_in_the_store() const { return codecs_of(TileKind::height, store_); }
 
     TemporaryFolder folder_;
     std::string dem_ = folder_.file("dem.tif"), inset_ = folder_.file("inset.tif"), store_ = folder_.file("s.scree");
@@ -93,6 +96,66 @@ TEST_F(HeightCodecs, OneThatIsUnknownIsRefusedAndTheKnownAreNamed) {
     const auto run = scree({"build", dem_, "-o", store_, "--height-codec", "newer"});
     EXPECT_EQ(run.exit_code, 2) << describe(run);
     for (const NamedHeightCodec& codec : height_codecs())
+        EXPECT_NE(run.err.find(codec.name), std::string::npos) << describe(run);
+}
+
+class TextureCodecs : public HeightCodecs {
+protected:
+    std::string build(const char* codec, const List& images, const List& more = {}) {
+        List arguments{dem_, inset_, "--imagery"};
+        arguments.insert(arguments.end(), images.begin(), images.end());
+        for (const char* word : {"--texture-size", "16", "--force", "--texture-codec", codec})
+            arguments.push_back(word);
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        build_store_from(arguments, store_);
+        return digest_of(store_);
+    }
+    std::vector<char> texels(const std::string& name) {
+        const std::string out = folder_.file(name);
+        const auto run = scree({"export", store_, "--imagery", out});
+        EXPECT_EQ(run.exit_code, 0) << describe(run);
+        const auto bytes = read_bytes(out);
+        return {bytes.begin(), bytes.end()};
+    }
+    std::string image(const char* name, double shift, const Colour& colour) {
+        const std::string path = folder_.file(name);
+        Place place;
+        place.x += shift;
+        place.area = true;
+        write_image(path, 120, 110, 3, 8, &place, colour);
+        return path;
+    }
+};
+
+TEST_F(TextureCodecs, ShowTheSameAndAreKeptByUpdatesForAnyThreads) {
+    const std::string photo = image("photo.tif", 0, patchwork);
+    const std::string later = image("later.tif", 600, [](int x, int y, int c) { return patchwork(y, x, c); });
+    std::set<std::string> digests;
+    std::set<std::vector<char>> seen, seen_later;
+    for (const NamedTextureCodec& codec : texture_codecs()) {
+        SCOPED_TRACE(codec.name);
+        const std::string digest = build(codec.name, {photo}, {"--threads", "1"});
+        EXPECT_TRUE(digests.insert(digest).second) << "another codec, the same bytes";
+        EXPECT_EQ(build(codec.name, {photo}, {"--threads", "4"}), digest);
+        EXPECT_EQ(codecs_of(TileKind::texture, store_), std::set<int>{static_cast<int>(codec.codec)});
+        expect_sound_store(store_, {1}, {"8M"});
+        seen.insert(texels(std::string(codec.name) + ".tif"));
+        const auto run = scree({"update", store_, "--imagery", later, "--quiet"});
+        ASSERT_EQ(run.exit_code, 0) << describe(run);
+        EXPECT_EQ(codecs_of(TileKind::texture, store_), std::set<int>{static_cast<int>(codec.codec)});
+        const std::string updated = digest_of(store_);
+        EXPECT_NE(updated, digest);
+        seen_later.insert(texels(std::string(codec.name) + "_later.tif"));
+        EXPECT_EQ(build(codec.name, {photo, later}), updated);
+    }
+    EXPECT_EQ(seen.size(), 1u) << "a codec may not change a texel";
+    EXPECT_EQ(seen_later.size(), 1u);
+}
+
+TEST_F(TextureCodecs, OneThatIsUnknownIsRefusedAndTheKnownAreNamed) {
+    const auto run = scree({"build", dem_, "-o", store_, "--texture-codec", "newer"});
+    EXPECT_EQ(run.exit_code, 2) << describe(run);
+    for (const NamedTextureCodec& codec : texture_codecs())
         EXPECT_NE(run.err.find(codec.name), std::string::npos) << describe(run);
 }
 
